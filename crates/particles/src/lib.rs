@@ -1,0 +1,18 @@
+//! Particles and where they come from.
+//!
+//! [`Particles`] is one frame: positions, radii, any number of named [`Column`]s, and the simulation
+//! box. [`Series`] gives frames on demand from a *source*: a file, a quoted pattern of files, or a
+//! deterministic `demo:` set. Files are read by the formats of [`read`].
+//!
+//! Invariant: nothing here knows a camera, a scene or a picture.
+
+mod column;
+mod error;
+mod particles;
+pub mod read;
+mod sim_box;
+
+pub use column::{Column, Values};
+pub use error::{Place, ReadError, Result};
+pub use particles::{Particles, PositionBuilder, Radius};
+pub use sim_box::SimulationBox;

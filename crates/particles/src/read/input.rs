@@ -1,0 +1,208 @@
+//! A file as a stream of bytes, decompressed on the way.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
+use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
+
+use crate::{ReadError, Result};
+
+/// How many decompressed bytes a format sees to recognise a file.
+const HEAD_BYTES: u64 = 64 * 1024;
+/// Size of the blocks that are read from the operating system.
+const BUFFER_BYTES: usize = 256 * 1024;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Compression {
+    None,
+    Gzip,
+    Zstd,
+}
+
+/// What a format sees of a file before it opens it.
+#[derive(Clone, Copy, Debug)]
+pub struct Head<'a> {
+    /// The file's name in lower case, without directories and without `.gz` or `.zst`.
+    pub name: &'a str,
+    /// The first 64 KiB, decompressed.
+    pub bytes: &'a [u8],
+    /// Whether `bytes` is the whole content.
+    pub whole: bool,
+}
+
+impl Head<'_> {
+    /// Whether the file's name ends in `.` and one of `extensions`.
+    pub fn has_extension(&self, extensions: &[&str]) -> bool {
+        self.name.rsplit_once('.').is_some_and(|(_, ext)| extensions.contains(&ext))
+    }
+
+    /// The lines that are complete, without their ends; bytes that are not UTF-8 are replaced.
+    pub fn lines(&self) -> impl Iterator<Item = String> {
+        let end = if self.whole {
+            self.bytes.len()
+        } else {
+            memchr::memrchr(b'\n', self.bytes).unwrap_or(self.bytes.len())
+        };
+        self.bytes[..end]
+            .split(|b| *b == b'\n')
+            .map(|line| String::from_utf8_lossy(line).trim_end_matches('\r').to_owned())
+    }
+}
+
+/// An open file. Cheap to hold: nothing but the head stays in memory.
+#[derive(Debug)]
+pub struct Input {
+    path: PathBuf,
+    name: String,
+    compression: Compression,
+    stored_bytes: u64,
+    head: Vec<u8>,
+    whole: bool,
+}
+
+impl Input {
+    /// Opens `path` and looks at its first bytes. Gzip and Zstandard are known by their signatures.
+    ///
+    /// # Errors
+    /// The file cannot be opened or read, is a directory, or its compressed data is broken.
+    pub fn open(path: &Path) -> Result<Self> {
+        let io = |e: std::io::Error| ReadError::io(path, &e);
+        let mut file = File::open(path).map_err(io)?;
+        let stored_bytes = file.metadata().map_err(io)?.len();
+        let mut magic = [0; 4];
+        let mut seen = 0;
+        while seen < 4 {
+            match file.read(&mut magic[seen..]).map_err(io)? {
+                0 => break,
+                n => seen += n,
+            }
+        }
+        let compression = match magic[..seen] {
+            [0x1f, 0x8b, ..] => Compression::Gzip,
+            // A frame, or a skippable frame before one.
+            [0x28, 0xb5, 0x2f, 0xfd] | [0x50..=0x5f, 0x2a, 0x4d, 0x18] => Compression::Zstd,
+            _ => Compression::None,
+        };
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        let name = match compression {
+            Compression::None => name,
+            _ => name.trim_end_matches(".gz").trim_end_matches(".zst").to_owned(),
+        };
+        let mut input =
+            Self { path: path.into(), name, compression, stored_bytes, head: vec![], whole: false };
+        let mut head = Vec::new();
+        input.stream(0)?.take(HEAD_BYTES + 1).read_to_end(&mut head).map_err(io)?;
+        input.whole = head.len() as u64 <= HEAD_BYTES;
+        head.truncate(HEAD_BYTES as usize);
+        input.head = head;
+        Ok(input)
+    }
+
+    /// The path as the user named it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The first bytes and the name.
+    pub fn head(&self) -> Head<'_> {
+        Head { name: &self.name, bytes: &self.head, whole: self.whole }
+    }
+
+    /// Bytes on disk.
+    pub fn stored_bytes(&self) -> u64 {
+        self.stored_bytes
+    }
+
+    /// Bytes of content where the file is stored as it is; `None` where it is compressed.
+    pub fn content_bytes(&self) -> Option<u64> {
+        (self.compression == Compression::None).then_some(self.stored_bytes)
+    }
+
+    /// The content from byte `offset` on (an offset in decompressed content; a compressed file is
+    /// decompressed up to there, in bounded memory).
+    ///
+    /// # Errors
+    /// The file cannot be opened, or ends before `offset` in a broken stream.
+    pub fn stream(&self, offset: u64) -> Result<Box<dyn Read + Send>> {
+        let io = |e: std::io::Error| ReadError::io(&self.path, &e);
+        let mut file = File::open(&self.path).map_err(io)?;
+        let mut stream: Box<dyn Read + Send> = match self.compression {
+            Compression::None => {
+                file.seek(SeekFrom::Start(offset)).map_err(io)?;
+                return Ok(Box::new(file));
+            }
+            Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(
+                BufReader::with_capacity(BUFFER_BYTES, file),
+            )),
+            Compression::Zstd => Box::new(ZstdMembers::new(BufReader::with_capacity(BUFFER_BYTES, file))),
+        };
+        std::io::copy(&mut stream.by_ref().take(offset), &mut std::io::sink()).map_err(io)?;
+        Ok(stream)
+    }
+
+    /// The content from `offset`, `bytes` long; fewer where the file ends before.
+    ///
+    /// Memory grows with what is there, not with what is asked for.
+    ///
+    /// # Errors
+    /// As [`Input::stream`].
+    pub fn read(&self, offset: u64, bytes: u64) -> Result<Vec<u8>> {
+        let mut out = Vec::new();
+        if let Some(all) = self.content_bytes() {
+            let there = all.saturating_sub(offset).min(bytes);
+            out.reserve_exact(usize::try_from(there).unwrap_or(0));
+        }
+        self.stream(offset)?
+            .take(bytes)
+            .read_to_end(&mut out)
+            .map_err(|e| ReadError::io(&self.path, &e))?;
+        Ok(out)
+    }
+}
+
+/// Decodes Zstandard frames one after another; skippable frames are skipped.
+struct ZstdMembers {
+    file: BufReader<File>,
+    decoder: FrameDecoder,
+    inside: bool,
+}
+
+impl ZstdMembers {
+    fn new(file: BufReader<File>) -> Self {
+        Self { file, decoder: FrameDecoder::new(), inside: false }
+    }
+}
+
+impl Read for ZstdMembers {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        use std::io::Error;
+        loop {
+            if !self.inside {
+                if self.file.fill_buf()?.is_empty() {
+                    return Ok(0);
+                }
+                match self.decoder.init(&mut self.file) {
+                    Ok(()) => self.inside = true,
+                    Err(FrameDecoderError::ReadFrameHeaderError(
+                        ReadFrameHeaderError::SkipFrame { length, .. },
+                    )) => {
+                        let skipped = &mut self.file.by_ref().take(u64::from(length));
+                        std::io::copy(skipped, &mut std::io::sink())?;
+                        continue;
+                    }
+                    Err(e) => return Err(Error::other(e)),
+                }
+            }
+            while self.decoder.can_collect() == 0 && !self.decoder.is_finished() {
+                let one = BlockDecodingStrategy::UptoBlocks(1);
+                self.decoder.decode_blocks(&mut self.file, one).map_err(Error::other)?;
+            }
+            match self.decoder.read(out)? {
+                0 if self.decoder.is_finished() => self.inside = false,
+                n => return Ok(n),
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The readers: one file per format, each by the format's own specification.
+//!
+//! A [`Format`] recognises a file by its content (its name only breaks ties) and opens it as a
+//! [`Reader`], which gives frames by number. To add a format, write `read/<format>.rs`, list it in
+//! [`FORMATS`], and its tests beside it.
+//!
+//! # What every reader promises
+//! - Nothing in a file makes it panic, hang, or take memory out of proportion to the file: a count
+//!   declared in a file is checked against what is there before memory is reserved for it.
+//! - Frames are found lazily: frame 0 of a 100 GB trajectory does not read to its end.
+//! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
+//! - An incomplete last frame is a warning, and the whole frames before it are served.
+
+mod input;
+pub mod names;
+
+pub use input::{Head, Input};
+
+use crate::{Particles, Place, ReadError, Result};
+
+/// How sure a format is that a file is its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Confidence {
+    /// It is not.
+    No,
+    /// The content would do and nothing speaks against it (bare tables of numbers).
+    Perhaps,
+    /// Content and file name fit.
+    Likely,
+    /// A signature or header that nothing else has.
+    Certain,
+}
+
+/// A file format.
+pub trait Format: Sync {
+    /// What users call it: `LAMMPS dump`, `legacy VTK`.
+    fn name(&self) -> &'static str;
+    /// How sure it is, from the first bytes and the name.
+    fn recognise(&self, head: &Head<'_>) -> Confidence;
+    /// Opens the file; reads no more than it needs to know that it can.
+    ///
+    /// # Errors
+    /// The header is broken.
+    fn open(&self, input: Input) -> Result<Box<dyn Reader>>;
+}
+
+/// Which columns are wanted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Wanted {
+    /// All of them.
+    #[default]
+    All,
+    /// These, by standard name; a reader may give more where leaving out saves nothing.
+    Only(Vec<String>),
+}
+
+impl Wanted {
+    /// Whether column `name` is wanted.
+    pub fn wants(&self, name: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::Only(names) => names.iter().any(|n| n == name),
+        }
+    }
+}
+
+/// Is told of long work: bytes done and bytes in all.
+pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
+
+/// An open file of one format.
+pub trait Reader: Send {
+    /// How many whole frames there are. Scans to the end of the file the first time.
+    ///
+    /// # Errors
+    /// The operating system's, and content between frames that is no frame.
+    fn count(&mut self, progress: Progress<'_>) -> Result<usize>;
+
+    /// Reads frame `frame`, counted from 0.
+    ///
+    /// # Errors
+    /// Broken content, or no such frame.
+    fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles>;
+
+    /// What was odd but could be read: an incomplete last frame, a count that does not agree.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// All formats, in the order they are asked; a tie goes to the earlier.
+pub static FORMATS: &[&dyn Format] = &[];
+
+/// Opens a file with the format that recognises it best; gives the format's name and the reader.
+///
+/// # Errors
+/// The file cannot be read, is empty, or no format recognises it.
+pub fn open(path: &std::path::Path) -> Result<(&'static str, Box<dyn Reader>)> {
+    let input = Input::open(path)?;
+    if input.head().bytes.is_empty() {
+        return Err(ReadError::new(path, Place::Whole, "the file is empty"));
+    }
+    let best = FORMATS
+        .iter()
+        .map(|format| (format.recognise(&input.head()), format))
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
+        .filter(|(confidence, _)| *confidence > Confidence::No);
+    match best {
+        Some((_, format)) => Ok((format.name(), format.open(input)?)),
+        None => {
+            let known: Vec<_> = FORMATS.iter().map(|f| f.name()).collect();
+            let message = format!("no known format; Motes reads {}", known.join(", "));
+            Err(ReadError::new(path, Place::Whole, message))
+        }
+    }
+}
