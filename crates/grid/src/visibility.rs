@@ -1,0 +1,172 @@
+//! Which particles are to be seen.
+//!
+//! Each block is hidden, shown or mixed, and only mixed blocks have a bit per particle. Renderers ask
+//! [`Visibility::block`] and know no filter. Spheres that coincide exactly with a visible one of the
+//! same radius can never be seen (at equal depth the lower index wins) and are hidden here too, so
+//! that a million particles at one point cost no more than one.
+
+use rayon::prelude::*;
+
+use crate::{BlockRanges, Grid};
+
+/// A range a particle's property must lie in to be seen, both ends included.
+pub struct Filter<'a> {
+    /// The property, as a function of the particle's index in the file's order.
+    pub value: &'a (dyn Fn(u32) -> f32 + Sync),
+    /// Its range in every block of the grid.
+    pub ranges: &'a BlockRanges,
+    /// Least value that is seen.
+    pub min: f32,
+    /// Greatest value that is seen.
+    pub max: f32,
+}
+
+impl Filter<'_> {
+    /// Whether the range decides for a whole block: all seen, none seen, or `None` where it does not.
+    fn decides(&self, block: usize) -> Option<bool> {
+        let (low, high) = self.ranges.ranges[block];
+        if high < self.min || low > self.max {
+            return Some(false);
+        }
+        // NaN hides in no range, so "all seen" cannot be said from the range alone.
+        None
+    }
+
+    fn passes(&self, index: u32) -> bool {
+        let value = (self.value)(index);
+        value >= self.min && value <= self.max
+    }
+}
+
+/// What is seen of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Seen<'a> {
+    /// None of its particles, or it has none.
+    Hidden,
+    /// All of them.
+    Shown,
+    /// Those whose bit is set: bit `i % 64` of word `i / 64` for the block's `i`-th particle.
+    Mixed(&'a [u64]),
+}
+
+/// What is seen of one grid.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    /// Per block: [`HIDDEN`], [`SHOWN`], or where its words begin.
+    states: Vec<u32>,
+    /// The words of mixed blocks.
+    words: Vec<u64>,
+    /// How many particles pass the filters.
+    visible: usize,
+}
+
+const HIDDEN: u32 = u32::MAX;
+const SHOWN: u32 = u32::MAX - 1;
+
+/// A block's state before the words are laid out.
+enum State {
+    Hidden,
+    Shown(usize),
+    Mixed { words: Vec<u64>, visible: usize },
+}
+
+impl Visibility {
+    /// Everything is seen.
+    pub fn all(grid: &Grid) -> Self {
+        Self::where_all(grid, &[], None)
+    }
+
+    /// What passes all `filters` and, if given, `keep` (by index in the file's order).
+    pub fn where_all(
+        grid: &Grid,
+        filters: &[Filter<'_>],
+        keep: Option<&(dyn Fn(u32) -> bool + Sync)>,
+    ) -> Self {
+        let states: Vec<State> = (0..grid.blocks.len() - 1)
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|block| state_of(grid, block, filters, keep))
+            .collect();
+        let mut visibility = Self { states: Vec::new(), words: Vec::new(), visible: 0 };
+        for state in states {
+            visibility.states.push(match state {
+                State::Hidden => HIDDEN,
+                State::Shown(count) => {
+                    visibility.visible += count;
+                    SHOWN
+                }
+                State::Mixed { words, visible } => {
+                    let start = visibility.words.len() as u32;
+                    visibility.words.extend(words);
+                    visibility.visible += visible;
+                    start
+                }
+            });
+        }
+        visibility
+    }
+
+    /// What is seen of block `block` of `grid`, the grid it was made for.
+    #[inline]
+    pub fn block<'a>(&'a self, grid: &Grid, block: usize) -> Seen<'a> {
+        match self.states[block] {
+            HIDDEN => Seen::Hidden,
+            SHOWN => Seen::Shown,
+            start => {
+                let words = grid.particles_of(block).len().div_ceil(64);
+                Seen::Mixed(&self.words[start as usize..start as usize + words])
+            }
+        }
+    }
+
+    /// How many particles pass the filters, coinciding ones included.
+    pub fn visible(&self) -> usize {
+        self.visible
+    }
+
+    /// Bytes it holds.
+    pub fn bytes(&self) -> usize {
+        self.states.len() * 4 + self.words.len() * 8
+    }
+}
+
+fn state_of(
+    grid: &Grid,
+    block: usize,
+    filters: &[Filter<'_>],
+    keep: Option<&(dyn Fn(u32) -> bool + Sync)>,
+) -> State {
+    let slots = grid.particles_of(block);
+    if slots.is_empty() || filters.iter().any(|f| f.decides(block) == Some(false)) {
+        return State::Hidden;
+    }
+    let crowded = grid.crowded.binary_search(&(block as u32)).is_ok();
+    if filters.is_empty() && keep.is_none() && !crowded {
+        return State::Shown(slots.len());
+    }
+    let mut words = vec![0; slots.len().div_ceil(64)];
+    let (mut visible, mut drawn) = (0, 0);
+    let mut last_drawn: Option<usize> = None;
+    for (i, slot) in slots.clone().enumerate() {
+        let index = grid.index[slot];
+        if !filters.iter().all(|f| f.passes(index)) || !keep.is_none_or(|keep| keep(index)) {
+            continue;
+        }
+        visible += 1;
+        // Equal spheres of crowded cells lie side by side, the lower index first.
+        let same = |a: usize| {
+            grid.center(a) == grid.center(slot) && grid.radius_at(a) == grid.radius_at(slot)
+        };
+        if crowded && last_drawn.is_some_and(same) {
+            continue;
+        }
+        last_drawn = Some(slot);
+        drawn += 1;
+        words[i / 64] |= 1 << (i % 64);
+    }
+    match drawn {
+        0 => State::Hidden,
+        n if n == slots.len() => State::Shown(n),
+        _ => State::Mixed { words, visible },
+    }
+}

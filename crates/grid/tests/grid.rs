@@ -1,0 +1,210 @@
+//! The grid against its definition, on easy and on hard inputs.
+
+use motes_grid::{
+    BlockRanges, Filter, Grid, Params, Radii, RadiusClasses, Resolution, Seen, Visibility,
+};
+
+/// Uniform numbers in 0..1 from a 64-bit mixer (splitmix64): the same in every run.
+fn random(n: usize, seed: u64) -> Vec<f32> {
+    (0..n as u64)
+        .map(|i| {
+            let mut z = (i + seed * 0x1_0000_0001).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+        })
+        .collect()
+}
+
+fn cloud(n: usize, seed: u64) -> Vec<[f32; 3]> {
+    random(3 * n, seed).chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+/// Each finite particle lies in exactly one cell, and inside that cell; blocks tell the truth.
+fn check(grid: &Grid, positions: &[[f32; 3]]) {
+    let mut seen: Vec<u32> = grid.index.clone();
+    seen.sort_unstable();
+    let expected: Vec<u32> = (0..positions.len() as u32)
+        .filter(|i| positions[*i as usize].iter().all(|v| v.is_finite()))
+        .collect();
+    assert_eq!(seen, expected);
+    assert_eq!(*grid.cell_starts.last().unwrap() as usize, grid.len());
+    assert!(grid.cell_starts.is_sorted());
+    for b in 0..grid.blocks.len() - 1 {
+        let block = grid.blocks[b];
+        let [nx, ny, _] = block.cells;
+        let slack = 1e-5 * (block.cell_low.abs().max_element() + grid.lattice.edge);
+        assert_eq!(grid.is_empty_block(b), grid.particles_of(b).is_empty());
+        for c in 0..block.cells.iter().product() {
+            let place = (block.first_cell + c) as usize;
+            let at = [c % nx, c / nx % ny, c / (nx * ny)];
+            for slot in grid.cell_starts[place] as usize..grid.cell_starts[place + 1] as usize {
+                let p = grid.center(slot);
+                assert_eq!(p.to_array(), positions[grid.index[slot] as usize]);
+                assert!(p.cmpge(block.low).all() && p.cmple(block.high).all());
+                for axis in 0..3 {
+                    let low = block.cell_low[axis] + at[axis] as f32 * block.cell_edge;
+                    assert!(p[axis] >= low - slack && p[axis] <= low + block.cell_edge + slack);
+                }
+            }
+        }
+    }
+}
+
+fn build(positions: &[[f32; 3]]) -> Grid {
+    let grid = Grid::build(positions, Radii::Uniform(0.001), None, Params::default());
+    check(&grid, positions);
+    grid
+}
+
+#[test]
+fn random_points_fill_blocks_of_about_six_cells() {
+    let grid = build(&cloud(200_000, 1));
+    let cells: Vec<u32> = grid.blocks.iter().map(|b| b.cells[0]).filter(|c| *c > 0).collect();
+    let mean = cells.iter().sum::<u32>() as f32 / cells.len() as f32;
+    assert!((5.5..6.5).contains(&mean), "{mean}");
+    assert!(grid.structure_bytes() <= 9 * grid.len(), "{}", grid.structure_bytes());
+}
+
+#[test]
+fn hard_inputs_are_gridded() {
+    assert!(build(&[]).is_empty());
+    assert_eq!(build(&[[1.0, 2.0, 3.0]]).len(), 1);
+    build(&vec![[0.5; 3]; 10_000]);
+    build(&cloud(50_000, 2).into_iter().map(|p| [p[0], p[1], 0.25]).collect::<Vec<_>>());
+    build(&cloud(50_000, 3).into_iter().map(|p| [0.0, p[1], 0.0]).collect::<Vec<_>>());
+    build(&cloud(5_000, 4).into_iter().map(|p| p.map(|v| v * 1e30)).collect::<Vec<_>>());
+    build(&cloud(5_000, 5).into_iter().map(|p| p.map(|v| v * 1e-30)).collect::<Vec<_>>());
+}
+
+#[test]
+fn positions_that_are_no_numbers_are_left_out() {
+    let mut positions = cloud(1000, 6);
+    positions[3][1] = f32::NAN;
+    positions[500][0] = f32::INFINITY;
+    positions[999][2] = f32::NEG_INFINITY;
+    assert_eq!(build(&positions).len(), 997);
+    let classes = RadiusClasses::build(&positions, Radii::Uniform(0.01), Params::default());
+    assert_eq!((classes.len(), classes.left_out), (997, 3));
+}
+
+#[test]
+fn clusters_a_thousand_times_denser_get_finer_cells_and_stay_small() {
+    let mut positions = cloud(20_000, 7);
+    for (i, p) in positions.iter_mut().enumerate().filter(|(i, _)| i % 2 == 0) {
+        let corner = (i / 2 % 5) as f32 / 5.0;
+        *p = p.map(|v| corner + 0.02 * v);
+    }
+    let grid = build(&positions);
+    let finest = grid.blocks.iter().map(|b| b.cells[0]).max().unwrap();
+    assert!(finest >= 10, "{finest}");
+    // One outlier must not press all others into one cell.
+    let mut far = cloud(20_000, 8);
+    far[17] = [1e6, 0.0, 0.0];
+    let grid = build(&far);
+    let fullest = grid.cell_starts.windows(2).map(|w| w[1] - w[0]).max().unwrap();
+    assert!(fullest < 64, "{fullest}");
+}
+
+#[test]
+fn any_number_of_threads_builds_the_same_grid() {
+    let positions = cloud(100_000, 9);
+    let radii: Vec<f32> = random(100_000, 10).iter().map(|r| 0.001 + 0.002 * r).collect();
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let grid =
+            pool.install(|| Grid::build(&positions, Radii::Each(&radii), None, Params::default()));
+        (grid.index, grid.cell_starts, grid.x, grid.radius)
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(3) && one == with(7));
+}
+
+#[test]
+fn a_grid_by_cell_length_has_cells_of_that_length() {
+    let positions = cloud(10_000, 11);
+    let params = Params { resolution: Resolution::CellEdge(0.05), block_cells: 4 };
+    let grid = Grid::build(&positions, Radii::Uniform(0.01), None, params);
+    check(&grid, &positions);
+    assert!((grid.lattice.edge - 0.2).abs() < 1e-5);
+    assert!(grid.blocks.iter().all(|b| b.cells == [0; 3] || b.cells == [4; 3]));
+    // A length far below the particles' spacing is not allowed to exhaust memory.
+    let params = Params { resolution: Resolution::CellEdge(1e-9), block_cells: 4 };
+    let grid = Grid::build(&positions, Radii::Uniform(0.01), None, params);
+    assert!(grid.structure_bytes() < 100 << 20);
+}
+
+#[test]
+fn radii_over_six_decades_fall_into_classes() {
+    let n = 50_000;
+    let positions = cloud(n, 12);
+    let mut radii: Vec<f32> = random(n, 13).iter().map(|u| 10f32.powf(-6.0 * u)).collect();
+    radii[5] = 0.0;
+    radii[6] = -1.0;
+    radii[7] = f32::NAN;
+    let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
+    assert_eq!((classes.len(), classes.left_out), (n - 3, 3));
+    assert!(classes.grids.len() >= 10);
+    for grid in &classes.grids {
+        assert!(grid.greatest_radius <= 4.0 * grid.least_radius);
+        assert!((0..grid.len()).all(|s| grid.radius_at(s) == radii[grid.index[s] as usize]));
+    }
+    let equal = vec![0.5; 100];
+    let classes = RadiusClasses::build(&positions[..100], Radii::Each(&equal), Params::default());
+    assert_eq!(classes.grids.len(), 1);
+}
+
+fn seen(grid: &Grid, visibility: &Visibility) -> Vec<u32> {
+    let mut all = Vec::new();
+    for b in 0..grid.blocks.len() - 1 {
+        let slots = grid.particles_of(b);
+        match visibility.block(grid, b) {
+            Seen::Hidden => {}
+            Seen::Shown => all.extend(&grid.index[slots]),
+            Seen::Mixed(words) => all.extend(
+                slots
+                    .enumerate()
+                    .filter(|(i, _)| words[i / 64] >> (i % 64) & 1 == 1)
+                    .map(|(_, s)| grid.index[s]),
+            ),
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn filters_show_what_brute_force_shows() {
+    let positions = cloud(30_000, 14);
+    let mut values = random(30_000, 15);
+    values[100] = f32::NAN;
+    let grid = build(&positions);
+    let by_x = |i: u32| positions[i as usize][0];
+    let by_value = |i: u32| values[i as usize];
+    let (x_ranges, value_ranges) = (BlockRanges::of(&grid, by_x), BlockRanges::of(&grid, by_value));
+    for (low, high) in [(0.0, 1.0), (0.25, 0.75), (0.5, 0.5001), (2.0, 3.0), (0.9, 0.1)] {
+        let filters = [
+            Filter { value: &by_x, ranges: &x_ranges, min: low, max: high },
+            Filter { value: &by_value, ranges: &value_ranges, min: 0.2, max: 0.9 },
+        ];
+        let keep = |i: u32| i % 7 != 0;
+        let visibility = Visibility::where_all(&grid, &filters, Some(&keep));
+        let expected: Vec<u32> = (0..30_000u32)
+            .filter(|i| (low..=high).contains(&by_x(*i)) && (0.2..=0.9).contains(&by_value(*i)))
+            .filter(|i| keep(*i))
+            .collect();
+        assert_eq!(seen(&grid, &visibility), expected);
+        assert_eq!(visibility.visible(), expected.len());
+    }
+    assert_eq!(seen(&grid, &Visibility::all(&grid)).len(), 30_000);
+}
+
+#[test]
+fn coinciding_spheres_are_seen_once_the_lowest_index_first() {
+    let positions = vec![[0.5; 3]; 100_000];
+    let grid = build(&positions);
+    assert_eq!(seen(&grid, &Visibility::all(&grid)), [0]);
+    let odd = Visibility::where_all(&grid, &[], Some(&|i| i % 2 == 1));
+    assert_eq!(seen(&grid, &odd), [1]);
+    assert_eq!(odd.visible(), 50_000);
+}
