@@ -103,6 +103,14 @@ impl Grid {
         }
     }
 
+    /// The least box around all centres; empty (low above high) without particles.
+    pub fn center_bounds(&self) -> (Vec3, Vec3) {
+        let occupied = self.blocks.iter().filter(|b| b.cells[0] > 0);
+        occupied.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), b| {
+            (low.min(b.low), high.max(b.high))
+        })
+    }
+
     /// Bytes of the particle data itself: positions, and radii where they differ.
     pub fn data_bytes(&self) -> usize {
         let radii = if let Radii::Each(r) = &self.radius { r.len() * 4 } else { 0 };

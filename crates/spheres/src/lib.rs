@@ -1,1 +1,21 @@
-//! spheres
+//! Ray-traced spheres.
+//!
+//! Gribble et al. 2007, *A Coherent Grid Traversal Approach to Visualizing Particle-based Simulation
+//! Data*: packets of rays and the frusta around them through a two-level grid of sphere centres.
+//!
+//! - [`Packet`]: rays and their nearest hits
+//! - [`trace`]: a packet through the grids of the systems
+//! - [`render`]: a whole picture, tile by tile, on all cores
+//! - [`reference`]: brute force in f64, the definition; for tests
+//!
+//! Invariants: no file, clock or environment is read here, and no result depends on the number of
+//! threads, the size of packets or of tiles.
+
+mod frustum;
+mod intersect;
+mod packet;
+pub mod reference;
+mod traverse;
+
+pub use packet::{LANES, MOST_RAYS, Packet};
+pub use traverse::{Counts, Spheres, trace};

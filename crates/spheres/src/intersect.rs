@@ -1,0 +1,171 @@
+//! Rays against spheres, sixteen at a time.
+//!
+//! With oc = c − o, b = oc·d and the perpendicular p = oc − b·d from the ray to the centre, a sphere of
+//! radius r is hit where r² − p² ≥ 0, at t = b − √(r² − p²), or, with the origin inside, at
+//! t = b + √(r² − p²). Going by p instead of b² − oc² + r² keeps f32 accurate far from the sphere.
+//!
+//! Fused multiply-adds are exact ones on every instruction set, so that all give the same bits.
+
+use fearless_simd::{f32x16, prelude::*, u32x16};
+use fearless_simd_macros::simd;
+use glam::Vec3;
+use motes_grid::Grid;
+
+use crate::frustum::Frustum;
+use crate::packet::{LANES, NO_SLOT, Packet};
+
+/// A sphere, and where it lies.
+#[derive(Clone, Copy)]
+pub(crate) struct Sphere {
+    pub center: Vec3,
+    pub radius: f32,
+    /// Slot in the system's grids.
+    pub slot: u32,
+}
+
+/// Tests all rays of the packet against one sphere and keeps nearer hits. Gives whether there were
+/// any. At equal distance the lower index in the file wins, and an earlier system before a later.
+#[simd]
+pub(crate) fn intersect<S: Simd>(
+    simd: S,
+    packet: &mut Packet,
+    sphere: Sphere,
+    index_of: &dyn Fn(u32) -> u32,
+) -> bool {
+    let [cx, cy, cz] = sphere.center.to_array().map(|v| f32x16::splat(simd, v));
+    let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
+    let zero = f32x16::splat(simd, 0.0);
+    let mut any = false;
+    for first in (0..packet.lanes()).step_by(LANES) {
+        let at = first..first + LANES;
+        let load = |from: &[f32]| f32x16::from_slice(simd, &from[at.clone()]);
+        let [dx, dy, dz] = [0, 1, 2].map(|a| load(&packet.direction[a]));
+        let (ox, oy, oz) = (
+            cx - load(&packet.origin[0]),
+            cy - load(&packet.origin[1]),
+            cz - load(&packet.origin[2]),
+        );
+        let b = oz.mul_add_precise(dz, oy.mul_add_precise(dy, ox * dx));
+        let minus_b = -b;
+        let px = minus_b.mul_add_precise(dx, ox);
+        let py = minus_b.mul_add_precise(dy, oy);
+        let pz = minus_b.mul_add_precise(dz, oz);
+        let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
+        let meets = inside.simd_ge(zero);
+        if !meets.any_true() {
+            continue;
+        }
+        let half = inside.max(zero).sqrt();
+        let entry = b - half;
+        let distance = entry.simd_gt(zero).select(entry, b + half);
+        let before = load(&packet.distance);
+        let hit = meets & distance.simd_gt(zero);
+        let nearer = hit & distance.simd_lt(before);
+        let ties = (hit & distance.simd_eq(before)).to_bitmask();
+        if nearer.any_true() {
+            any = true;
+            nearer.select(distance, before).store_slice(&mut packet.distance[at.clone()]);
+            let slots = u32x16::from_slice(simd, &packet.slot[at.clone()]);
+            let slot = u32x16::splat(simd, sphere.slot);
+            nearer.select(slot, slots).store_slice(&mut packet.slot[at.clone()]);
+        }
+        if ties != 0 {
+            break_ties(packet, sphere.slot, (first, ties), index_of);
+        }
+    }
+    any
+}
+
+fn break_ties(
+    packet: &mut Packet,
+    slot: u32,
+    (first, ties): (usize, u64),
+    index_of: &dyn Fn(u32) -> u32,
+) {
+    for lane in (0..LANES).filter(|lane| ties >> lane & 1 == 1) {
+        let held = &mut packet.slot[first + lane];
+        if *held != NO_SLOT && *held != slot && index_of(slot) < index_of(*held) {
+            *held = slot;
+        }
+    }
+}
+
+/// How far along K the packet's rays still look: the greatest k·sign of any ray's nearest hit.
+#[simd]
+pub(crate) fn farthest<S: Simd>(simd: S, packet: &Packet, frustum: &Frustum) -> f32 {
+    let k = frustum.axes[0];
+    let sign = f32x16::splat(simd, frustum.sign);
+    let mut farthest = f32x16::splat(simd, f32::NEG_INFINITY);
+    for first in (0..packet.lanes()).step_by(LANES) {
+        let load = |from: &[f32]| f32x16::from_slice(simd, &from[first..first + LANES]);
+        let d = load(&packet.direction[k]);
+        let reach = load(&packet.distance).mul_add(d, load(&packet.origin[k]));
+        farthest = farthest.max(reach * sign);
+    }
+    farthest.reduce_max()
+}
+
+/// The frustum as sixteen-lane constants, to cull sixteen spheres at a time.
+#[derive(Clone, Copy)]
+pub(crate) struct Cull<S: Simd> {
+    at_zero: [f32x16<S>; 4],
+    slope: [f32x16<S>; 4],
+    widen: [f32x16<S>; 2],
+    pad: f32x16<S>,
+    sign: f32x16<S>,
+}
+
+impl<S: Simd> Cull<S> {
+    #[inline(always)]
+    pub fn new(simd: S, frustum: &Frustum) -> Self {
+        let splat = |v| f32x16::splat(simd, v);
+        Self {
+            at_zero: frustum.at_start.map(splat),
+            slope: frustum.slope.map(splat),
+            widen: frustum.widen.map(splat),
+            pad: splat(frustum.pad),
+            sign: splat(frustum.sign),
+        }
+    }
+}
+
+/// Which of the sixteen spheres from `slot` on may be met: bit i for sphere `slot + i`.
+///
+/// A sphere goes if its centre lies farther than its radius from a plane (Gribble et al. 2007, §4.3,
+/// "SIMD Sphere/Frustum Culling"), if it lies wholly beyond `reach` (every ray has hit something
+/// nearer), or wholly behind the start.
+#[simd]
+pub(crate) fn cull<S: Simd>(
+    simd: S,
+    planes: &Cull<S>,
+    frustum: &Frustum,
+    (grid, slot): (&Grid, usize),
+    reach: f32,
+) -> u64 {
+    let [k, u, v] = frustum.axes.map(|axis| {
+        let from = [&grid.x, &grid.y, &grid.z][axis];
+        sixteen(simd, from, slot)
+    });
+    let radius = match &grid.radius {
+        motes_grid::Radii::Uniform(r) => f32x16::splat(simd, *r),
+        motes_grid::Radii::Each(radii) => sixteen(simd, radii, slot),
+    };
+    let along = k - f32x16::splat(simd, frustum.k_start);
+    let u_shift = radius.mul_add(planes.widen[0], planes.pad);
+    let v_shift = radius.mul_add(planes.widen[1], planes.pad);
+    let plane = |p: usize| planes.slope[p].mul_add(along, planes.at_zero[p]);
+    let in_u = (u + u_shift).simd_ge(plane(0)) & (u - u_shift).simd_le(plane(1));
+    let in_v = (v + v_shift).simd_ge(plane(2)) & (v - v_shift).simd_le(plane(3));
+    let ahead = (along * planes.sign + radius + planes.pad).simd_ge(f32x16::splat(simd, 0.0));
+    let near = (k * planes.sign - radius - planes.pad).simd_le(f32x16::splat(simd, reach));
+    (in_u & in_v & ahead & near).to_bitmask()
+}
+
+/// Sixteen values from `at` on; past the end the last one repeats.
+#[inline(always)]
+fn sixteen<S: Simd>(simd: S, from: &[f32], at: usize) -> f32x16<S> {
+    match from.get(at..at + LANES) {
+        Some(values) => f32x16::from_slice(simd, values),
+        None => f32x16::from_fn(simd, |i| from[(at + i).min(from.len() - 1)]),
+    }
+}

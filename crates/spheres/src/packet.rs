@@ -1,0 +1,137 @@
+//! A packet of rays and what each has hit so far.
+
+use glam::Vec3;
+
+/// Rays tested side by side by one SIMD instruction.
+pub const LANES: usize = 16;
+/// Most rays of a packet: 16 × 16 (Gribble et al. 2007, Table 2).
+pub const MOST_RAYS: usize = 256;
+/// The slot of a ray that has hit nothing of the current system.
+pub const NO_SLOT: u32 = u32::MAX;
+
+/// Up to 256 rays, coordinate by coordinate, and each one's nearest hit.
+///
+/// # Invariants
+/// The number of lanes in use is a multiple of [`LANES`]; lanes past the last ray repeat ray 0, so
+/// that no bound over the lanes is wider than over the rays.
+#[derive(Clone, Debug)]
+pub struct Packet {
+    pub(crate) rays: usize,
+    pub(crate) origin: [[f32; MOST_RAYS]; 3],
+    pub(crate) direction: [[f32; MOST_RAYS]; 3],
+    /// Distance of the nearest hit; +∞ for none.
+    pub(crate) distance: [f32; MOST_RAYS],
+    /// Where in the grids of the system at hand the nearest sphere lies, if that system has it.
+    pub(crate) slot: [u32; MOST_RAYS],
+    /// The slot of the nearest sphere of all systems.
+    hit_slot: [u32; MOST_RAYS],
+    /// The system of the nearest sphere.
+    hit_system: [u16; MOST_RAYS],
+}
+
+impl Packet {
+    /// A packet without rays.
+    pub fn new() -> Self {
+        Self {
+            rays: 0,
+            origin: [[0.0; MOST_RAYS]; 3],
+            direction: [[0.0; MOST_RAYS]; 3],
+            distance: [f32::INFINITY; MOST_RAYS],
+            slot: [NO_SLOT; MOST_RAYS],
+            hit_slot: [NO_SLOT; MOST_RAYS],
+            hit_system: [0; MOST_RAYS],
+        }
+    }
+
+    /// Removes all rays and hits.
+    pub fn clear(&mut self) {
+        self.rays = 0;
+    }
+
+    /// Adds a ray; `direction` has unit length.
+    ///
+    /// # Panics
+    /// If the packet is full.
+    pub fn push(&mut self, origin: Vec3, direction: Vec3) {
+        let i = self.rays;
+        for axis in 0..3 {
+            self.origin[axis][i] = origin[axis];
+            self.direction[axis][i] = direction[axis];
+        }
+        self.distance[i] = f32::INFINITY;
+        self.hit_slot[i] = NO_SLOT;
+        self.rays += 1;
+    }
+
+    /// How many rays there are.
+    pub fn len(&self) -> usize {
+        self.rays
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rays == 0
+    }
+
+    /// Lanes in use.
+    pub(crate) fn lanes(&self) -> usize {
+        self.rays.next_multiple_of(LANES)
+    }
+
+    /// Fills the lanes past the last ray with ray 0.
+    pub(crate) fn pad(&mut self) {
+        for i in self.rays..self.lanes() {
+            for axis in 0..3 {
+                self.origin[axis][i] = self.origin[axis][0];
+                self.direction[axis][i] = self.direction[axis][0];
+            }
+            self.distance[i] = self.distance[0];
+            self.slot[i] = self.slot[0];
+        }
+    }
+
+    /// Origin of ray `i`.
+    pub fn origin_of(&self, i: usize) -> Vec3 {
+        Vec3::from_array(self.origin.map(|v| v[i]))
+    }
+
+    /// Direction of ray `i`.
+    pub fn direction_of(&self, i: usize) -> Vec3 {
+        Vec3::from_array(self.direction.map(|v| v[i]))
+    }
+
+    /// Begins a system: no ray has hit it yet.
+    pub(crate) fn begin_system(&mut self) {
+        self.slot.fill(NO_SLOT);
+        self.pad();
+    }
+
+    /// Ends a system: where its spheres are nearest, they are the hits.
+    pub(crate) fn end_system(&mut self, system: u16) {
+        for i in (0..self.rays).filter(|i| self.slot[*i] != NO_SLOT) {
+            self.hit_slot[i] = self.slot[i];
+            self.hit_system[i] = system;
+        }
+    }
+
+    /// What ray `i` has hit first: distance, system and slot.
+    pub fn hit(&self, i: usize) -> Option<(f32, u16, u32)> {
+        (self.hit_slot[i] != NO_SLOT)
+            .then(|| (self.distance[i], self.hit_system[i], self.hit_slot[i]))
+    }
+
+    /// Ray `i` alone.
+    pub(crate) fn single(&self, i: usize) -> Self {
+        let mut one = Self::new();
+        one.push(self.origin_of(i), self.direction_of(i));
+        one.distance[0] = self.distance[i];
+        one.slot[0] = self.slot[i];
+        one
+    }
+}
+
+impl Default for Packet {
+    fn default() -> Self {
+        Self::new()
+    }
+}

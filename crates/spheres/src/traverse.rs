@@ -1,0 +1,309 @@
+//! Coherent grid traversal: a packet through the slices of a grid, blocks first, then cells.
+//!
+//! Gribble et al. 2007, §2 and §4: the packet goes slice by slice along its major axis; in each slice
+//! the frustum, enlarged by the greatest radius, overlaps a rectangle of blocks, in a block each slice
+//! of cells a rectangle of cells. The spheres of these are culled sixteen at a time and what remains
+//! is tested against all rays. It ends where every ray has hit something nearer than the next slice.
+
+use fearless_simd::prelude::*;
+use fearless_simd_macros::simd;
+use motes_grid::{Grid, RadiusClasses, Seen, Visibility};
+
+use crate::frustum::{Bounds, Frustum};
+use crate::intersect::{Cull, Sphere, cull, farthest, intersect};
+use crate::packet::{LANES, Packet};
+
+/// One particle system as the tracer sees it: its grids, and what is visible of each.
+#[derive(Clone, Copy, Debug)]
+pub struct Spheres<'a> {
+    /// The grids, greatest radii first.
+    pub classes: &'a RadiusClasses,
+    /// One per grid.
+    pub visible: &'a [Visibility],
+}
+
+impl Spheres<'_> {
+    /// The grid that holds `slot`, and the place in it. Slots count through all grids of the system.
+    pub fn locate(&self, slot: u32) -> (&Grid, usize) {
+        let mut place = slot as usize;
+        let mut grids = self.classes.grids.iter();
+        let mut grid = grids.next();
+        while let Some(g) = grid {
+            if place < g.len() {
+                return (g, place);
+            }
+            place -= g.len();
+            grid = grids.next();
+        }
+        unreachable!("slots come from these grids")
+    }
+
+    /// A sphere's index in the file's own order.
+    pub fn index(&self, slot: u32) -> u32 {
+        let (grid, place) = self.locate(slot);
+        grid.index[place]
+    }
+}
+
+/// Counts of work, for the statistics and the paper's tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Spheres that were culled or tested.
+    pub spheres: u64,
+    /// Ray–sphere tests.
+    pub tests: u64,
+}
+
+/// Traces the packet through the systems; afterwards each ray holds its nearest hit.
+#[simd]
+pub fn trace<S: Simd>(simd: S, packet: &mut Packet, systems: &[Spheres<'_>], counts: &mut Counts) {
+    for (system, spheres) in systems.iter().enumerate() {
+        packet.begin_system();
+        let mut first_slot = 0;
+        for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
+            trace_grid(simd, packet, Room { spheres, grid, visible, first_slot }, counts);
+            first_slot += grid.len() as u32;
+        }
+        packet.end_system(system as u16);
+    }
+}
+
+/// A grid, where its slots begin in its system, and what is visible of it.
+#[derive(Clone, Copy)]
+struct Room<'a> {
+    spheres: &'a Spheres<'a>,
+    grid: &'a Grid,
+    visible: &'a Visibility,
+    first_slot: u32,
+}
+
+/// Cells along K of one step inside a block where K is x: rows along x are runs of particles.
+const X_STEP: u32 = 4;
+
+#[simd]
+fn trace_grid<S: Simd>(simd: S, packet: &mut Packet, room: Room<'_>, counts: &mut Counts) {
+    let grid = room.grid;
+    let (low, high) = grid.center_bounds();
+    match Frustum::around(packet, low, high, grid.greatest_radius) {
+        Bounds::Nothing => {}
+        Bounds::Incoherent => {
+            for i in 0..packet.rays {
+                let mut one = packet.single(i);
+                one.pad();
+                trace_grid(simd, &mut one, room, counts);
+                packet.distance[i] = one.distance[0];
+                packet.slot[i] = one.slot[0];
+            }
+            packet.pad();
+        }
+        Bounds::Frustum(frustum) => {
+            let cull = Cull::new(simd, &frustum);
+            let reach = farthest(simd, packet, &frustum);
+            Walk { packet, room, frustum, cull, reach, counts }.blocks(simd);
+        }
+    }
+}
+
+/// A packet on its way through a grid.
+struct Walk<'a, S: Simd> {
+    packet: &'a mut Packet,
+    room: Room<'a>,
+    frustum: Frustum,
+    cull: Cull<S>,
+    /// How far along K the rays still look, times the sign of K.
+    reach: f32,
+    counts: &'a mut Counts,
+}
+
+impl<S: Simd> Walk<'_, S> {
+    /// Walks the slices of blocks.
+    #[inline(always)]
+    fn blocks(&mut self, simd: S) {
+        let grid = self.room.grid;
+        let lattice = &grid.lattice;
+        let radius = grid.greatest_radius;
+        let [k, u, v] = self.frustum.axes;
+        let edge = lattice.edge;
+        let at = |axis: usize, value: f32| (value - lattice.low[axis]) / edge;
+        let slices =
+            Steps::new(at(k, self.frustum.k_start), at(k, self.frustum.k_end), lattice.dims[k]);
+        for slice in slices {
+            let k0 = lattice.low[k] + slice as f32 * edge;
+            let ks = (k0 - self.frustum.pad, k0 + edge + self.frustum.pad);
+            if self.beyond(ks, radius) {
+                break;
+            }
+            let (u0, u1) = self.frustum.span(0, ks, radius);
+            let (v0, v1) = self.frustum.span(1, ks, radius);
+            let Some((u0, u1)) = clip(at(u, u0), at(u, u1), lattice.dims[u]) else { continue };
+            let Some((v0, v1)) = clip(at(v, v0), at(v, v1), lattice.dims[v]) else { continue };
+            for bv in v0..=v1 {
+                for bu in u0..=u1 {
+                    let mut block = [0; 3];
+                    (block[k], block[u], block[v]) = (slice, bu, bv);
+                    self.block(simd, lattice.index(block));
+                }
+            }
+        }
+    }
+
+    /// Whether no ray looks as far as spheres with centres in `ks`.
+    #[inline(always)]
+    fn beyond(&self, ks: (f32, f32), radius: f32) -> bool {
+        let nearest = (ks.0 * self.frustum.sign).min(ks.1 * self.frustum.sign);
+        nearest - radius - self.frustum.pad > self.reach
+    }
+
+    /// Walks the slices of cells of one block.
+    #[inline(always)]
+    fn block(&mut self, simd: S, index: usize) {
+        let grid = self.room.grid;
+        let block = &grid.blocks[index];
+        let seen = self.room.visible.block(grid, index);
+        let [k, u, v] = self.frustum.axes;
+        let radius = block.greatest_radius;
+        if seen == Seen::Hidden
+            || self.beyond((block.low[k], block.high[k]), radius)
+            || !self.frustum.meets_box(block.low, block.high, radius)
+        {
+            return;
+        }
+        let edge = block.cell_edge;
+        let at = |axis: usize, value: f32| (value - block.cell_low[axis]) / edge;
+        let step = if k == 0 { X_STEP } else { 1 };
+        let slices = block.cells[k].div_ceil(step);
+        for slice in Steps::new(
+            at(k, self.frustum.k_start) / step as f32,
+            at(k, self.frustum.k_end) / step as f32,
+            slices,
+        ) {
+            let first = slice * step;
+            let last = (first + step).min(block.cells[k]) - 1;
+            let k0 = block.cell_low[k] + first as f32 * edge;
+            let k1 = block.cell_low[k] + (last + 1) as f32 * edge;
+            let ks = (k0 - self.frustum.pad, k1 + self.frustum.pad);
+            if self.beyond(ks, radius) {
+                return;
+            }
+            let (u0, u1) = self.frustum.span(0, ks, radius);
+            let (v0, v1) = self.frustum.span(1, ks, radius);
+            let Some(us) = clip(at(u, u0), at(u, u1), block.cells[u]) else { continue };
+            let Some(vs) = clip(at(v, v0), at(v, v1), block.cells[v]) else { continue };
+            let mut ranges = [(0, 0); 3];
+            (ranges[k], ranges[u], ranges[v]) = ((first, last), us, vs);
+            let [(x0, x1), ys, zs] = ranges;
+            for z in zs.0..=zs.1 {
+                for y in ys.0..=ys.1 {
+                    let row = block.first_cell + (z * block.cells[1] + y) * block.cells[0];
+                    let from = grid.cell_starts[(row + x0) as usize] as usize;
+                    let to = grid.cell_starts[(row + x1) as usize + 1] as usize;
+                    self.run(simd, (from, to), seen, block.first as usize);
+                }
+            }
+        }
+    }
+
+    /// Culls and tests the particles of a run of cells.
+    #[inline(always)]
+    fn run(&mut self, simd: S, (from, to): (usize, usize), seen: Seen<'_>, block_first: usize) {
+        let mut slot = from;
+        while slot < to {
+            let count = (to - slot).min(LANES);
+            let mut may = u64::MAX >> (64 - count);
+            if let Seen::Mixed(words) = seen {
+                may &= bits(words, slot - block_first);
+                if may == 0 {
+                    slot += count;
+                    continue;
+                }
+            }
+            self.counts.spheres += count as u64;
+            may &= cull(simd, &self.cull, &self.frustum, (self.room.grid, slot), self.reach);
+            let mut nearer = false;
+            while may != 0 {
+                let place = slot + may.trailing_zeros() as usize;
+                may &= may - 1;
+                nearer |= self.test(simd, place);
+            }
+            if nearer {
+                self.reach = farthest(simd, self.packet, &self.frustum);
+            }
+            slot += count;
+        }
+    }
+
+    #[inline(always)]
+    fn test(&mut self, simd: S, place: usize) -> bool {
+        let grid = self.room.grid;
+        let sphere = Sphere {
+            center: grid.center(place),
+            radius: grid.radius_at(place),
+            slot: self.room.first_slot + place as u32,
+        };
+        self.counts.tests += self.packet.rays as u64;
+        intersect(simd, self.packet, sphere, &|slot| self.room.spheres.index(slot))
+    }
+}
+
+/// Whole numbers from `low` to `high`, both in units of cells, within 0..`cells`; `None` if there are
+/// none.
+#[inline(always)]
+fn clip(low: f32, high: f32, cells: u32) -> Option<(u32, u32)> {
+    // A particle on the far face may lie a rounding outside.
+    if high < 0.0 || low > cells as f32 * (1.0 + 1e-5) {
+        return None;
+    }
+    // `as` truncates and saturates: below zero is zero.
+    Some(((low as u32).min(cells - 1), (high as u32).min(cells - 1)))
+}
+
+/// The slices from `start` to `end` (in units of slices, in either direction) within 0..`slices`.
+struct Steps {
+    next: i64,
+    step: i64,
+    left: i64,
+}
+
+impl Steps {
+    #[inline(always)]
+    fn new(start: f32, end: f32, slices: u32) -> Self {
+        let last = i64::from(slices) - 1;
+        // Rounding may put either end one slice aside; one more slice on each costs little.
+        let forward = end >= start;
+        let whole =
+            |value: f32, aside: i64| (value.floor() as i64).saturating_add(aside).clamp(0, last);
+        if forward {
+            let (first, end) = (whole(start, -1), whole(end, 1));
+            Self { next: first, step: 1, left: end - first + 1 }
+        } else {
+            let (first, end) = (whole(start, 1), whole(end, -1));
+            Self { next: first, step: -1, left: first - end + 1 }
+        }
+    }
+}
+
+impl Iterator for Steps {
+    type Item = u32;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<u32> {
+        if self.left == 0 {
+            return None;
+        }
+        let slice = self.next as u32;
+        self.next += self.step;
+        self.left -= 1;
+        Some(slice)
+    }
+}
+
+/// Sixteen bits of `words` from bit `at` on.
+#[inline(always)]
+fn bits(words: &[u64], at: usize) -> u64 {
+    let (word, shift) = (at / 64, at % 64);
+    let low = words[word] >> shift;
+    match words.get(word + 1) {
+        Some(next) if shift > 0 => low | next << (64 - shift),
+        _ => low,
+    }
+}
