@@ -1,1 +1,29 @@
-//! scene
+//! The scene: every parameter of Motes, and the pure functions that give it meaning.
+//!
+//! [`Scene`] is the scene as typed, in TOML or by [`Scene::set`]; each parameter's name, default, unit
+//! and line of meaning stand once, in `scene.rs`. [`Scene::resolve`] refuses nonsense and makes what is
+//! relative absolute: [`Resolved`], with the camera as a [`CameraView`] that gives rays.
+//!
+//! Invariants: plain data and pure functions; no file, clock or environment is read, and no other crate
+//! of Motes is known here.
+
+mod bounds;
+mod camera;
+mod color;
+mod error;
+mod resolve;
+mod scene;
+mod set;
+mod settings;
+mod text;
+
+pub use bounds::Bounds;
+pub use camera::{CameraView, Projected, Rays};
+pub use color::{Color, linear_from_srgb, srgb_from_linear};
+pub use error::{Result, SceneError, nearest};
+pub use resolve::{Background, KeyLight, Lights, Resolved};
+pub use scene::{
+    Axis, Camera, ColorBy, Coloring, Component, Filter, Image, Light, Overlay, Palette, Projection,
+    RangeOver, RelativeTo, Scene, Show, Spheres, System, Tone,
+};
+pub use settings::{Field, Setting, Shape};

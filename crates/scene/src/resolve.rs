@@ -1,0 +1,288 @@
+//! From the scene as typed to the scene as meant: nonsense is refused, relative becomes absolute.
+
+use glam::{DVec3, Vec3};
+
+use crate::bounds::Bounds;
+use crate::camera::CameraView;
+use crate::error::{Result, SceneError};
+use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
+
+/// A scene that can be drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resolved {
+    /// The camera, standing.
+    pub view: CameraView,
+    /// The lights, in world coordinates and linear light.
+    pub lights: Lights,
+    /// The background, in linear light.
+    pub background: Background,
+}
+
+/// The background in linear light; both alike where it is one colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Background {
+    /// At the top of the picture.
+    pub top: Vec3,
+    /// At the bottom.
+    pub bottom: Vec3,
+}
+
+impl Background {
+    /// The colour at `t` down the picture, 0 at the top, 1 at the bottom.
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.top.lerp(self.bottom, t)
+    }
+}
+
+/// The lights in world coordinates and linear light: a surface of albedo ρ and normal n that sees them
+/// all has the light ρ·(key·max(0, n·d) + fill(n)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lights {
+    /// The key light.
+    pub key: KeyLight,
+    /// The upward axis of the fill, a unit vector.
+    pub up: Vec3,
+    /// Fill light on a surface that faces up.
+    pub sky: Vec3,
+    /// Fill light on a surface that faces down.
+    pub ground: Vec3,
+    /// Light on every surface alike.
+    pub ambient: Vec3,
+}
+
+/// A distant round light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KeyLight {
+    /// Unit vector towards its middle.
+    pub direction: Vec3,
+    /// Its light on a surface that faces it.
+    pub color: Vec3,
+    /// Cosine of half the angle across it; 1 for a point.
+    pub cos_half_angle: f32,
+    /// Whether it casts shadows.
+    pub shadows: bool,
+}
+
+impl Lights {
+    /// Fill and ambient light on an unoccluded surface of unit normal `n`: half of each hemisphere's
+    /// weight at the horizon.
+    pub fn fill(&self, n: Vec3) -> Vec3 {
+        self.ground.lerp(self.sky, 0.5 + 0.5 * n.dot(self.up)) + self.ambient
+    }
+
+    fn new(light: &Light, camera: &Camera, view: &CameraView) -> Self {
+        let d = light.direction;
+        let direction = match light.relative_to {
+            RelativeTo::World => d,
+            RelativeTo::Camera => view.right * d.x + view.up * d.y - view.forward * d.z,
+        };
+        Self {
+            key: KeyLight {
+                direction: direction.normalize().as_vec3(),
+                color: Vec3::from(light.color.linear()) * light.intensity as f32,
+                cos_half_angle: (light.softness.to_radians() / 2.0).cos() as f32,
+                shadows: light.shadows,
+            },
+            up: camera.up_axis.vector().as_vec3(),
+            sky: Vec3::from(light.sky.linear()) * light.fill as f32,
+            ground: Vec3::from(light.ground.linear()) * light.fill as f32,
+            ambient: Vec3::splat(light.ambient as f32),
+        }
+    }
+}
+
+impl Scene {
+    /// Checks every parameter and places camera and lights, framing `bounds`, the box around what is
+    /// visible (with radii; `None` if nothing is).
+    ///
+    /// # Errors
+    /// As [`Scene::check`].
+    pub fn resolve(&self, bounds: Option<Bounds>) -> Result<Resolved> {
+        self.check()?;
+        let view = CameraView::new(&self.camera, bounds, (self.image.width, self.image.height));
+        let lights = Lights::new(&self.light, &self.camera, &view);
+        let bottom = self.image.background_bottom.unwrap_or(self.image.background);
+        let background = Background {
+            top: Vec3::from(self.image.background.linear()),
+            bottom: Vec3::from(bottom.linear()),
+        };
+        Ok(Resolved { view, lights, background })
+    }
+
+    /// Refuses parameters that make no sense.
+    ///
+    /// # Errors
+    /// The parameter's path, what it can be and what it is.
+    pub fn check(&self) -> Result<()> {
+        self.system.iter().enumerate().try_for_each(|(i, s)| check_system(s, i))?;
+        check_camera(&self.camera)?;
+        check_image(&self.image)?;
+        check_light(&self.light)?;
+        check_spheres(&self.spheres)?;
+        check_overlay(&self.overlay)
+    }
+}
+
+/// `value` at `path` must be what `fits` says, in words `expected`.
+fn need<T: std::fmt::Debug>(path: &str, value: T, fits: bool, expected: &str) -> Result<()> {
+    if fits { Ok(()) } else { Err(SceneError::value(path, expected, format!("{value:?}"))) }
+}
+
+fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
+    let fits = v.is_none_or(|v| v.is_finite() && v.normalize_or_zero() != DVec3::ZERO);
+    need(path, v.map(|v| v.to_array()), fits, "a finite vector with a length")
+}
+
+fn positive(v: f64) -> bool {
+    v > 0.0 && v.is_finite()
+}
+
+fn not_negative(v: f64) -> bool {
+    v >= 0.0 && v.is_finite()
+}
+
+fn check_system(system: &System, index: usize) -> Result<()> {
+    let at = |name: &str| format!("system.{index}.{name}");
+    let (scale, radius) = (system.radius_scale, system.radius);
+    need(&at("radius_scale"), scale, positive(scale), "a number above 0")?;
+    need(&at("radius"), radius, radius.is_none_or(positive), "a number above 0")?;
+    for (name, r) in &system.radii {
+        need(&at(&format!("radii.{name}")), r, positive(*r), "a number above 0")?;
+    }
+    for (i, f) in system.filter.iter().enumerate() {
+        let at = |name: &str| at(&format!("filter.{i}.{name}"));
+        need(&at("property"), &f.property, !f.property.is_empty(), "the name of a property")?;
+        let numbers = ![f.min, f.max].iter().flatten().any(|v| v.is_nan());
+        need(&at("min"), (f.min, f.max), numbers, "numbers for min and max")?;
+    }
+    if let Some([a, b]) = system.color.range {
+        let fits = a.is_finite() && b.is_finite();
+        need(&at("color.range"), [a, b], fits, "two finite numbers")?;
+        let fits = !system.color.log || (a > 0.0 && b > 0.0);
+        need(&at("color.range"), [a, b], fits, "two numbers above 0, as color.log is true")?;
+    }
+    Ok(())
+}
+
+fn check_camera(camera: &Camera) -> Result<()> {
+    let (fov, height, margin) = (camera.fov, camera.height, camera.margin);
+    need("camera.fov", fov, fov > 0.0 && fov < 180.0, "degrees above 0 and below 180")?;
+    need("camera.height", height, height.is_none_or(positive), "a number above 0")?;
+    need("camera.margin", margin, (0.0..=0.9).contains(&margin), "a number in 0 to 0.9")?;
+    for (path, v) in [("camera.position", camera.position), ("camera.target", camera.target)] {
+        let fits = v.is_none_or(|v| v.is_finite());
+        need(path, v.map(|v| v.to_array()), fits, "finite coordinates")?;
+    }
+    need_vector("camera.direction", camera.direction)?;
+    need_vector("camera.up", camera.up)?;
+    if let (Some(position), Some(target)) = (camera.position, camera.target) {
+        let apart = (target - position).normalize_or_zero() != DVec3::ZERO;
+        need("camera.position", position.to_array(), apart, "a point apart from camera.target")?;
+    }
+    Ok(())
+}
+
+fn check_image(image: &Image) -> Result<()> {
+    for (path, size) in [("image.width", image.width), ("image.height", image.height)] {
+        need(path, size, (1..=65_535).contains(&size), "1 to 65535 pixels")?;
+    }
+    let samples = image.samples;
+    need("image.samples", samples, (1..=1024).contains(&samples), "1 to 1024 rays per pixel")?;
+    let e = image.exposure;
+    need("image.exposure", e, (-30.0..=30.0).contains(&e), "a number in -30 to 30")
+}
+
+fn check_light(light: &Light) -> Result<()> {
+    need_vector("light.direction", Some(light.direction))?;
+    let numbers = [
+        ("light.intensity", light.intensity),
+        ("light.fill", light.fill),
+        ("light.ambient", light.ambient),
+    ];
+    for (path, v) in numbers {
+        need(path, v, not_negative(v), "a number, 0 or more")?;
+    }
+    let angle = light.softness;
+    need("light.softness", angle, (0.0..=180.0).contains(&angle), "degrees in 0 to 180")
+}
+
+fn check_spheres(spheres: &Spheres) -> Result<()> {
+    let (packet, lambda, block) = (spheres.packet, spheres.lambda, spheres.block);
+    need("spheres.packet", packet, [2, 4, 8, 16].contains(&packet), "2, 4, 8 or 16")?;
+    need("spheres.lambda", lambda, positive(lambda), "a number above 0")?;
+    need("spheres.block", block, (1..=64).contains(&block), "1 to 64 cells")
+}
+
+fn check_overlay(overlay: &Overlay) -> Result<()> {
+    let size = overlay.text_size;
+    need("overlay.text_size", size, size > 0.0 && size <= 0.5, "a number above 0, at most 0.5")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_scene_resolves() {
+        let resolved = Scene::default().resolve(None).unwrap();
+        assert!((resolved.lights.key.direction.length() - 1.0).abs() < 1e-6);
+        assert!((resolved.lights.key.cos_half_angle - 6f32.to_radians().cos()).abs() < 1e-6);
+        assert_eq!(resolved.background.top, resolved.background.bottom);
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_its_path() {
+        for (assignments, path) in [
+            (&["camera.fov=0"][..], "camera.fov"),
+            (&["camera.fov=180"], "camera.fov"),
+            (&["camera.fov=nan"], "camera.fov"),
+            (&["camera.up=0,0,0"], "camera.up"),
+            (&["camera.position=1,2,inf"], "camera.position"),
+            (&["camera.position=1,2,3", "camera.target=1,2,3"], "camera.position"),
+            (&["camera.height=-1"], "camera.height"),
+            (&["camera.margin=1"], "camera.margin"),
+            (&["image.samples=0"], "image.samples"),
+            (&["image.samples=1025"], "image.samples"),
+            (&["image.width=0"], "image.width"),
+            (&["image.height=65536"], "image.height"),
+            (&["image.exposure=nan"], "image.exposure"),
+            (&["spheres.packet=5"], "spheres.packet"),
+            (&["spheres.lambda=0"], "spheres.lambda"),
+            (&["spheres.block=0"], "spheres.block"),
+            (&["light.direction=0,0,0"], "light.direction"),
+            (&["light.softness=-1"], "light.softness"),
+            (&["system.radius=0"], "system.0.radius"),
+            (&["system.radius_scale=inf"], "system.0.radius_scale"),
+            (&["system.radii.Na=-1"], "system.0.radii.Na"),
+            (&["system.color.range=0,1", "system.color.log=true"], "system.0.color.range"),
+            (&["system.filter=[{min=1}]"], "system.0.filter.0.property"),
+            (&["overlay.text_size=0"], "overlay.text_size"),
+        ] {
+            let mut scene = Scene::default();
+            for a in assignments {
+                scene.set_text(a).unwrap();
+            }
+            let error = scene.resolve(None).unwrap_err();
+            let named = matches!(&error, SceneError::Value { path: p, .. } if p == path);
+            assert!(named, "{assignments:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn light_follows_the_camera_or_stays() {
+        let mut scene = Scene::default();
+        scene.set("camera.position", "0,-10,0").unwrap();
+        scene.set("camera.target", "0,0,0").unwrap();
+        scene.set("light.direction", "0,0,1").unwrap();
+        // Towards the viewer: back to where the camera stands.
+        let lights = scene.resolve(None).unwrap().lights;
+        assert!(lights.key.direction.abs_diff_eq(Vec3::NEG_Y, 1e-6));
+        scene.set("light.relative_to", "world").unwrap();
+        let lights = scene.resolve(None).unwrap().lights;
+        assert_eq!(lights.key.direction, Vec3::Z);
+        // Fill: the sky from above, the ground from below, half and half at the horizon.
+        assert_eq!(lights.fill(Vec3::Z), lights.sky);
+        assert_eq!(lights.fill(Vec3::NEG_Z), lights.ground);
+        assert!(lights.fill(Vec3::X).abs_diff_eq((lights.sky + lights.ground) / 2.0, 1e-6));
+    }
+}

@@ -1,0 +1,225 @@
+//! `path=value` into a scene, as `--set` and the viewer do.
+
+use toml::{Table, Value};
+
+use crate::error::{Result, SceneError};
+use crate::scene::Scene;
+use crate::settings::{Setting, Shape};
+use crate::text::join;
+
+impl Scene {
+    /// Sets a parameter from `path=value`, as [`Scene::set`] does.
+    ///
+    /// # Errors
+    /// As [`Scene::set`]; or there is no `=`.
+    pub fn set_text(&mut self, assignment: &str) -> Result<()> {
+        let (path, value) = assignment
+            .split_once('=')
+            .ok_or_else(|| SceneError::value(assignment, "path=value", "no `=`"))?;
+        self.set(path.trim(), value.trim())
+    }
+
+    /// Sets the parameter at `path`, such as `camera.fov` or `system.0.color.map`; without its index
+    /// (`system.color.map`), in every system.
+    ///
+    /// `value` is TOML; a bare word is text, and `1,2,3` is `[1,2,3]`.
+    ///
+    /// # Errors
+    /// No such path (the nearest is named) or a value of the wrong type (what was expected is named);
+    /// the scene is then as it was.
+    pub fn set(&mut self, path: &str, value: &str) -> Result<()> {
+        let names: Vec<&str> = path.split('.').collect();
+        let shape = Self::shape();
+        let leaf = find(&shape, &names).ok_or_else(|| unknown_path(&shape, path))?;
+        let wrong = || SceneError::value(path, leaf.expected(), format!("`{value}`"));
+        let tree = Value::Table(Table::try_from(&*self).map_err(|_| wrong())?);
+        for reading in readings(value) {
+            let mut tree = tree.clone();
+            assign(&shape, &mut tree, Target { names: &names, path: "" }, &reading)?;
+            if let Ok(scene) = tree.try_into() {
+                *self = scene;
+                return Ok(());
+            }
+        }
+        Err(wrong())
+    }
+}
+
+/// What `text` can mean, the first that fits wins: TOML; a list without its brackets; a bare word.
+fn readings(text: &str) -> Vec<Value> {
+    let toml = |text: String| -> Option<Value> {
+        let mut table: Table = toml::from_str(&format!("v = {text}")).ok()?;
+        if table.len() == 1 { table.remove("v") } else { None }
+    };
+    let mut readings: Vec<Value> = toml(text.into()).into_iter().collect();
+    if text.contains(',') {
+        readings.extend(toml(format!("[{text}]")));
+    }
+    readings.push(Value::String(text.into()));
+    readings
+}
+
+/// What stands at `names` below `shape`; an index of a list may be left out.
+fn find<'a>(shape: &'a Shape, names: &[&str]) -> Option<&'a Shape> {
+    let Some((name, rest)) = names.split_first() else { return Some(shape) };
+    match shape {
+        Shape::Value(_) => None,
+        Shape::Map(of) => find(of, rest),
+        Shape::List(of) if name.parse::<usize>().is_ok() => find(of, rest),
+        Shape::List(of) => find(of, names),
+        Shape::Table(fields) => find(&fields.iter().find(|f| f.name == *name)?.shape, rest),
+    }
+}
+
+/// The names still to go, and the path gone so far.
+#[derive(Clone, Copy)]
+struct Target<'a> {
+    names: &'a [&'a str],
+    path: &'a str,
+}
+
+/// Puts `new` where `target` points below `value`; the path is known to be one of `shape`'s.
+fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: &Value) -> Result<()> {
+    let Some((name, rest)) = target.names.split_first() else {
+        *value = new.clone();
+        return Ok(());
+    };
+    let path = join(target.path, name);
+    let next = Target { names: rest, path: &path };
+    match (shape, value) {
+        (Shape::List(of), Value::Array(items)) => match name.parse::<usize>() {
+            Ok(index) => {
+                let count = items.len();
+                let item = items.get_mut(index).ok_or_else(|| {
+                    let expected = format!("an index below {count} (they count from 0)");
+                    SceneError::value(target.path, expected, index)
+                })?;
+                assign(of, item, next, new)
+            }
+            Err(_) => items.iter_mut().try_for_each(|item| assign(of, item, target, new)),
+        },
+        (Shape::Map(of), Value::Table(table)) => {
+            assign(of, table.entry(*name).or_insert(Value::Boolean(false)), next, new)
+        }
+        (Shape::Table(fields), Value::Table(table)) => {
+            match fields.iter().find(|f| f.name == *name) {
+                Some(field) => {
+                    let entry = table.entry(field.name).or_insert(Value::Boolean(false));
+                    assign(&field.shape, entry, next, new)
+                }
+                None => Ok(()),
+            }
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Names the parameter most like `path`, by its whole path or by its last word.
+fn unknown_path(shape: &Shape, path: &str) -> SceneError {
+    let mut known = Vec::new();
+    paths(shape, "", &mut known);
+    let typed: Vec<_> = path.split('.').filter(|w| w.parse::<usize>().is_err()).collect();
+    let (whole, last) = (typed.join("."), typed.last().copied().unwrap_or_default());
+    let score = |known: &str| {
+        let known_last = known.rsplit('.').next().unwrap_or(known);
+        let by_last = strsim::jaro_winkler(last, known_last);
+        // The whole path breaks ties between parameters of one name.
+        by_last.max(strsim::jaro_winkler(&whole, known)) + 0.01 * strsim::jaro(&whole, known)
+    };
+    let nearest = known.iter().map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = match nearest {
+        Some((score, known)) if score > 0.75 => format!("; did you mean `{known}`?"),
+        _ => "; `motes scene` prints them all".into(),
+    };
+    SceneError::UnknownPath { path: path.into(), hint }
+}
+
+/// Every parameter's path, without indices.
+fn paths(shape: &Shape, path: &str, out: &mut Vec<String>) {
+    match shape {
+        Shape::Table(fields) => {
+            fields.iter().for_each(|f| paths(&f.shape, &join(path, f.name), out));
+        }
+        Shape::List(of) => paths(of, path, out),
+        Shape::Value(_) | Shape::Map(_) => out.push(path.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Color;
+    use crate::scene::{ColorBy, Projection, System};
+    use glam::DVec3;
+
+    fn with(assignments: &[&str]) -> Scene {
+        let mut scene = Scene::default();
+        scene.system.push(System::default());
+        for a in assignments {
+            scene.set_text(a).unwrap_or_else(|e| panic!("{a}: {e}"));
+        }
+        scene
+    }
+
+    #[test]
+    fn values_of_every_kind() {
+        let scene = with(&[
+            "image.samples=16",
+            "camera.fov = 40",
+            "camera.position=1,2,3",
+            "camera.projection=orthographic",
+            "system.radius=2",
+            "system.1.radius=1",
+            "system.color.map=magma",
+            "system.color.by=Particle Type",
+            "system.color.range=0,1.5",
+            "system.0.color.colors.Na=red",
+            "system.where=x > 1 && y = 2",
+            "system.1.filter=[{property=\"Mass\", min=1}]",
+            "system.1.filter.0.max=3",
+            "image.background=#ff0000",
+        ]);
+        assert_eq!((scene.image.samples, scene.camera.fov), (16, 40.0));
+        assert_eq!(scene.camera.position, Some(DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!(scene.camera.projection, Projection::Orthographic);
+        assert_eq!([scene.system[0].radius, scene.system[1].radius], [Some(2.0), Some(1.0)]);
+        assert_eq!(scene.system[1].color.map, "magma");
+        assert_eq!(scene.system[1].color.by, ColorBy::Property("Particle Type".into()));
+        assert_eq!(scene.system[0].color.range, Some([0.0, 1.5]));
+        assert_eq!(scene.system[0].color.colors["Na"], Color::hex(0xff0000));
+        assert_eq!(scene.system[0].r#where, "x > 1 && y = 2");
+        assert_eq!(scene.system[1].filter[0].max, Some(3.0));
+        assert_eq!(scene.image.background, Color::hex(0xff0000));
+    }
+
+    #[test]
+    fn text_that_looks_like_another_type_stays_text() {
+        let scene = with(&["system.name=12", "system.source=true", "system.0.name=1,2"]);
+        assert_eq!(scene.system[0].name, "1,2");
+        assert_eq!((&*scene.system[1].name, &*scene.system[1].source), ("12", "true"));
+    }
+
+    #[test]
+    fn errors_say_what_was_meant() {
+        let error = |a: &str| Scene::default().set_text(a).unwrap_err().to_string();
+        for (typed, named) in [
+            ("image.sampels=4", "`image.samples`"),
+            ("samples=4", "`image.samples`"),
+            ("fov=4", "`camera.fov`"),
+            ("system.0.colour.map=magma", "`system.color.map`"),
+            ("camera.fov.x=1", "`camera.fov`"),
+            ("qqqqq=1", "`motes scene`"),
+        ] {
+            assert!(error(typed).contains(named), "{typed}: {}", error(typed));
+        }
+        assert_eq!(
+            error("image.samples=many"),
+            "image.samples: expected a whole number, 0 or more, found `many`"
+        );
+        assert!(error("image.samples=-1").contains("found `-1`"));
+        assert!(error("camera.projection=fish").contains("perspective, orthographic"));
+        assert!(error("system.7.radius=1").contains("an index below 1"));
+        assert!(error("fov").contains("path=value"));
+        assert!(error("camera.fov=1\nimage = 3").contains("a number"));
+    }
+}

@@ -1,0 +1,286 @@
+//! The scene as TOML: read with errors that name line, path and nearest word; written plain, or with
+//! every parameter's line of meaning.
+
+use std::fmt::Write as _;
+use std::ops::Range;
+
+use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Table, Value};
+
+use crate::error::{Result, SceneError, hint};
+use crate::scene::Scene;
+use crate::settings::{Field, Setting, Shape};
+
+impl Scene {
+    /// Reads a scene; what it does not name has its default.
+    ///
+    /// # Errors
+    /// The line, and what was expected there: a typo names the nearest word.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let at = |span: Range<usize>| line_of(text, span.start);
+        let table = DeTable::parse(text).map_err(|e| SceneError::Text {
+            line: e.span().map_or(1, at),
+            reason: format!("not TOML: {}", e.message().replace('\n', "; ")),
+        })?;
+        let mut values = Vec::new();
+        let found = Unknown::find(table.get_ref(), &Self::shape(), "", &mut values);
+        if let Some(Unknown { span, reason }) = found {
+            return Err(SceneError::Text { line: at(span), reason });
+        }
+        toml::from_str(text).map_err(|e| type_error(text, &e, &values))
+    }
+
+    /// The scene as TOML, every parameter that has a value, without comments.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    /// The scene as TOML with every parameter's line of meaning; those without a value stand commented
+    /// out, with an example.
+    pub fn to_documented_toml(&self) -> String {
+        let table = Table::try_from(self).unwrap_or_default();
+        let mut out =
+            String::from("# A scene of Motes. What is left out has the value shown here.\n");
+        if let Shape::Table(fields) = Self::shape() {
+            document(&mut out, &fields, &table, "");
+        }
+        out
+    }
+
+    /// The whole scene with its defaults and one line of meaning each; reading it gives the default.
+    pub fn documented_toml() -> String {
+        Self::default().to_documented_toml()
+    }
+}
+
+/// A parameter's value in the text: where it stands, its path, and what it can be.
+struct ValueAt {
+    span: Range<usize>,
+    path: String,
+    shape: Shape,
+}
+
+/// A name in the text that is no parameter.
+struct Unknown {
+    span: Range<usize>,
+    reason: String,
+}
+
+impl Unknown {
+    /// The first unknown name in `table`; on the way, gathers where every value stands.
+    fn find(
+        table: &DeTable<'_>,
+        shape: &Shape,
+        path: &str,
+        values: &mut Vec<ValueAt>,
+    ) -> Option<Self> {
+        for (key, value) in table {
+            let name: &str = key.get_ref();
+            let inner = match shape {
+                Shape::Table(fields) => match fields.iter().find(|f| f.name == name) {
+                    Some(field) => &field.shape,
+                    None => {
+                        let place =
+                            if path.is_empty() { String::new() } else { format!(" in {path}") };
+                        let hint = hint(name, fields.iter().map(|f| f.name));
+                        let reason = format!("no parameter `{name}`{place}{hint}");
+                        return Some(Self { span: key.span(), reason });
+                    }
+                },
+                Shape::Map(of) => of,
+                Shape::Value(_) | Shape::List(_) => continue,
+            };
+            let found = Self::find_in_value(value, inner, &join(path, name), values);
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    }
+
+    fn find_in_value(
+        value: &Spanned<DeValue<'_>>,
+        shape: &Shape,
+        path: &str,
+        values: &mut Vec<ValueAt>,
+    ) -> Option<Self> {
+        values.push(ValueAt { span: value.span(), path: path.into(), shape: shape.clone() });
+        match (value.get_ref(), shape) {
+            (DeValue::Table(table), _) => Self::find(table, shape, path, values),
+            (DeValue::Array(items), Shape::List(of)) => items
+                .iter()
+                .enumerate()
+                .find_map(|(i, v)| Self::find_in_value(v, of, &join(path, &i.to_string()), values)),
+            _ => None,
+        }
+    }
+}
+
+/// A value of the wrong type: names the parameter whose value the error stands in.
+fn type_error(text: &str, error: &toml::de::Error, values: &[ValueAt]) -> SceneError {
+    let span = error.span().unwrap_or(0..0);
+    let inside = |v: &&ValueAt| v.span.start <= span.start && span.end <= v.span.end;
+    let reason = match values.iter().filter(inside).min_by_key(|v| v.span.len()) {
+        Some(v) => format!(
+            "{}: expected {}, found {} ({})",
+            v.path,
+            v.shape.expected(),
+            text.get(v.span.clone()).unwrap_or("something else"),
+            error.message().replace('\n', "; ")
+        ),
+        None => error.message().replace('\n', "; "),
+    };
+    SceneError::Text { line: line_of(text, span.start), reason }
+}
+
+/// The line of byte `at`, from 1.
+fn line_of(text: &str, at: usize) -> usize {
+    1 + text.bytes().take(at).filter(|b| *b == b'\n').count()
+}
+
+pub(crate) fn join(path: &str, name: &str) -> String {
+    if path.is_empty() { name.into() } else { format!("{path}.{name}") }
+}
+
+/// Writes the values of a table, then the tables in it: TOML wants them last.
+fn document(out: &mut String, fields: &[Field], table: &Table, path: &str) {
+    let is_section = |f: &Field| {
+        matches!(f.shape, Shape::Table(_))
+            || matches!(f.shape, Shape::List(_)) && f.example.is_none()
+    };
+    for field in fields.iter().filter(|f| !is_section(f)) {
+        let value = table.get(field.name).filter(|v| !is_empty(v) || field.example.is_none());
+        let _ = match (value, field.example) {
+            (Some(value), _) => write!(out, "# {}\n{} = {value}\n", field.meaning, field.name),
+            (None, Some(example)) => {
+                write!(out, "# {}\n# {} = {example}\n", field.meaning, field.name)
+            }
+            (None, None) => Ok(()),
+        };
+    }
+    for field in fields.iter().filter(|f| is_section(f)) {
+        let path = join(path, field.name);
+        let section = |out: &mut String, header: &str, shape: &Shape, value: &Value| {
+            let _ = write!(out, "\n# {}\n{header}\n", field.meaning);
+            if let (Shape::Table(fields), Value::Table(table)) = (shape, value) {
+                document(out, fields, table, &path);
+            }
+        };
+        match (&field.shape, table.get(field.name)) {
+            (Shape::List(of), Some(Value::Array(items))) => {
+                for item in items {
+                    section(out, &format!("[[{path}]]"), of, item);
+                }
+            }
+            (shape, Some(value)) => section(out, &format!("[{path}]"), shape, value),
+            (_, None) => {}
+        }
+    }
+}
+
+fn is_empty(value: &Value) -> bool {
+    match value {
+        Value::Table(t) => t.is_empty(),
+        Value::Array(a) => a.is_empty(),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_documented_scene_reads_as_the_default() {
+        let text = Scene::documented_toml();
+        assert_eq!(Scene::from_toml(&text), Ok(Scene::default()), "{text}");
+        assert_eq!(Scene::from_toml(""), Ok(Scene::default()));
+    }
+
+    #[test]
+    fn every_example_is_fit_and_every_meaning_one_line() {
+        fn visit(shape: &Shape, path: &str) {
+            match shape {
+                Shape::Table(fields) => {
+                    for f in fields {
+                        let path = join(path, f.name);
+                        assert!(f.meaning.ends_with('.') && !f.meaning.contains('\n'), "{path}");
+                        if let Some(example) = f.example {
+                            let mut scene = Scene::default();
+                            if let Some(of) = path.strip_prefix("system.filter.") {
+                                scene.set("system.filter", "[{}]").unwrap();
+                                scene.set(&format!("system.filter.0.{of}"), example).unwrap();
+                            } else {
+                                scene.set(&path, example).unwrap();
+                            }
+                            assert_ne!(scene, Scene::default(), "{path}");
+                        }
+                        visit(&f.shape, &path);
+                    }
+                }
+                Shape::List(of) => visit(of, path),
+                Shape::Map(_) | Shape::Value(_) => {}
+            }
+        }
+        visit(&Scene::shape(), "");
+    }
+
+    #[test]
+    fn a_scene_round_trips() {
+        let mut scene = Scene::default();
+        scene.set_sources(&["a.xyz".into(), "b # \"quoted\".xyz".into()]);
+        for a in [
+            "camera.position=1,2,3",
+            "system.1.color.colors={ \"a.b\" = \"red\", 2 = [0.1, 0.2, 0.3] }",
+            "system.0.filter=[{ property = \"Mass\", max = inf }]",
+            "image.background_bottom=#123456",
+        ] {
+            scene.set_text(a).unwrap();
+        }
+        assert_eq!(Scene::from_toml(&scene.to_toml()), Ok(scene.clone()));
+        assert_eq!(Scene::from_toml(&scene.to_documented_toml()), Ok(scene));
+    }
+
+    #[test]
+    fn errors_name_line_and_nearest_word() {
+        let error = |text: &str| Scene::from_toml(text).unwrap_err().to_string();
+        assert_eq!(
+            error("[image]\nwidth = 3\nsampels = 4\n"),
+            "line 3: no parameter `sampels` in image; did you mean `samples`?"
+        );
+        assert_eq!(
+            error("[camra]\nfov = 3"),
+            "line 1: no parameter `camra`; did you mean `camera`?"
+        );
+        let text = "[[system]]\n[[system]]\ncolor.mapp = \"magma\"";
+        assert_eq!(
+            error(text),
+            "line 3: no parameter `mapp` in system.1.color; did you mean `map`?"
+        );
+        let wrong = error("[camera]\n\nfov = \"wide\"");
+        assert!(
+            wrong.starts_with("line 3: camera.fov: expected a number, found \"wide\""),
+            "{wrong}"
+        );
+        let wrong = error("[image]\nbackground = \"whit\"");
+        assert!(wrong.contains("line 2: image.background: expected a colour"), "{wrong}");
+        assert!(wrong.contains("did you mean `white`"), "{wrong}");
+        assert!(error("a = 1\nb = [").starts_with("line 2: not TOML"), "{}", error("a = 1\nb = ["));
+        let wrong = error("image = 3");
+        assert!(wrong.starts_with("line 1: image: expected a table of width"), "{wrong}");
+        assert!(error("[camera]\nprojection = \"fish\"").contains("perspective"));
+    }
+
+    #[test]
+    fn sources_fill_the_systems() {
+        let mut scene = Scene::default();
+        scene.system[0].radius = Some(2.0);
+        scene.system[0].name = "first".into();
+        scene.set_sources(&["a".into(), "b".into()]);
+        assert_eq!((&*scene.system[1].source, &*scene.system[1].name), ("b", ""));
+        assert_eq!(scene.system[1].radius, Some(2.0));
+        scene.system.clear();
+        scene.set_sources(&["c".into()]);
+        assert_eq!(scene.system, [crate::System { source: "c".into(), ..Default::default() }]);
+    }
+}
