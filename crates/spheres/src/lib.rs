@@ -15,7 +15,11 @@ mod frustum;
 mod intersect;
 mod packet;
 pub mod reference;
+mod render;
+mod shade;
 mod traverse;
 
 pub use packet::{LANES, MOST_RAYS, Packet};
+pub use render::{Center, Picture, Settings, View, render};
+pub use shade::Paint;
 pub use traverse::{Counts, Spheres, trace};

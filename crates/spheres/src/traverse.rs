@@ -54,6 +54,14 @@ pub struct Counts {
     pub tests: u64,
 }
 
+impl Counts {
+    /// Adds another count.
+    pub fn add(&mut self, other: Self) {
+        self.spheres += other.spheres;
+        self.tests += other.tests;
+    }
+}
+
 /// Traces the packet through the systems; afterwards each ray holds its nearest hit.
 #[simd]
 pub fn trace<S: Simd>(simd: S, packet: &mut Packet, systems: &[Spheres<'_>], counts: &mut Counts) {

@@ -262,7 +262,7 @@ fn hard_shapes() {
     check_all(
         "clusters",
         &Scene::new(clusters),
-        &rays(Vec3::splat(2.0), Vec3::splat(0.4), 0.6, 48),
+        &rays(Vec3::splat(2.0), Vec3::splat(0.4), 0.02, 48),
     );
     let one = Scene::new([(Vec3::splat(1e6), 5.0)]);
     check_all("one", &one, &rays(Vec3::splat(1e6) + Vec3::X * 20.0, Vec3::splat(1e6), 0.6, 16));
