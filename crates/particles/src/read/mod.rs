@@ -11,8 +11,14 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod fields;
+mod forward;
 mod input;
+mod lanes;
+mod lines;
 pub mod names;
+mod numpy;
+mod ply;
 
 pub use input::{Head, Input};
 
@@ -88,7 +94,7 @@ pub trait Reader: Send {
 }
 
 /// All formats, in the order they are asked; a tie goes to the earlier.
-pub static FORMATS: &[&dyn Format] = &[];
+pub static FORMATS: &[&dyn Format] = &[&ply::Ply, &numpy::Npy, &numpy::Npz];
 
 /// Opens a file with the format that recognises it best; gives the format's name and the reader.
 ///

@@ -43,3 +43,7 @@ pub const ATOM_NAME: &str = "Atom Name";
 pub const B_FACTOR: &str = "B Factor";
 /// Occupancy.
 pub const OCCUPANCY: &str = "Occupancy";
+/// Unit vector across the surface a point was taken from, three components.
+pub const NORMAL: &str = "Normal";
+/// Acceleration, three components.
+pub const ACCELERATION: &str = "Acceleration";
