@@ -111,13 +111,13 @@ impl Column {
     pub fn range(&self) -> Vec<Option<(f64, f64)>> {
         (0..self.components)
             .map(|c| {
-                (0..self.rows())
-                    .map(|row| self.number(row, c))
-                    .filter(|v| v.is_finite())
-                    .fold(None, |range, v| match range {
+                (0..self.rows()).map(|row| self.number(row, c)).filter(|v| v.is_finite()).fold(
+                    None,
+                    |range, v| match range {
                         None => Some((v, v)),
                         Some((low, high)) => Some((v.min(low), v.max(high))),
-                    })
+                    },
+                )
             })
             .collect()
     }

@@ -140,7 +140,8 @@ impl PositionBuilder {
 
     fn decide_origin(&mut self) {
         if self.origin.is_none() {
-            self.origin = Some(choose_origin(&self.waiting[..self.waiting.len().min(ORIGIN_SAMPLE)]));
+            self.origin =
+                Some(choose_origin(&self.waiting[..self.waiting.len().min(ORIGIN_SAMPLE)]));
             let waiting = std::mem::take(&mut self.waiting);
             self.keep(&waiting);
         }

@@ -136,7 +136,9 @@ impl Input {
             Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(
                 BufReader::with_capacity(BUFFER_BYTES, file),
             )),
-            Compression::Zstd => Box::new(ZstdMembers::new(BufReader::with_capacity(BUFFER_BYTES, file))),
+            Compression::Zstd => {
+                Box::new(ZstdMembers::new(BufReader::with_capacity(BUFFER_BYTES, file)))
+            }
         };
         std::io::copy(&mut stream.by_ref().take(offset), &mut std::io::sink()).map_err(io)?;
         Ok(stream)

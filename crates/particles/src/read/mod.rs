@@ -11,8 +11,13 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod dump;
 mod input;
 pub mod names;
+mod rows;
+mod text;
+mod trajectory;
+mod xyz;
 
 pub use input::{Head, Input};
 
@@ -88,7 +93,7 @@ pub trait Reader: Send {
 }
 
 /// All formats, in the order they are asked; a tie goes to the earlier.
-pub static FORMATS: &[&dyn Format] = &[];
+pub static FORMATS: &[&dyn Format] = &[&dump::LammpsDump, &xyz::Xyz];
 
 /// Opens a file with the format that recognises it best; gives the format's name and the reader.
 ///
