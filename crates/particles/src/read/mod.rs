@@ -13,12 +13,17 @@
 
 mod fields;
 mod forward;
+mod dump;
 mod input;
 mod lanes;
 mod lines;
 pub mod names;
 mod numpy;
 mod ply;
+mod rows;
+mod text;
+mod trajectory;
+mod xyz;
 
 pub use input::{Head, Input};
 
@@ -94,7 +99,14 @@ pub trait Reader: Send {
 }
 
 /// All formats, in the order they are asked; a tie goes to the earlier.
-pub static FORMATS: &[&dyn Format] = &[&ply::Ply, &numpy::Npy, &numpy::Npz];
+#[rustfmt::skip] // one a line
+pub static FORMATS: &[&dyn Format] = &[
+    &dump::LammpsDump,
+    &xyz::Xyz,
+    &ply::Ply,
+    &numpy::Npy,
+    &numpy::Npz,
+];
 
 /// Opens a file with the format that recognises it best; gives the format's name and the reader.
 ///

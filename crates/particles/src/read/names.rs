@@ -47,3 +47,88 @@ pub const OCCUPANCY: &str = "Occupancy";
 pub const NORMAL: &str = "Normal";
 /// Acceleration, three components.
 pub const ACCELERATION: &str = "Acceleration";
+
+/// Surface normal, three components.
+/// Angular momentum, three components.
+pub const ANGULAR_MOMENTUM: &str = "Angular Momentum";
+/// Dipole moment, three components.
+pub const DIPOLE: &str = "Dipole Orientation";
+/// Torque, three components.
+pub const TORQUE: &str = "Torque";
+
+/// Spellings of properties, in lower case.
+const SPELLINGS: &[(&str, &[&str])] = &[
+    (POSITION, &["position", "positions", "pos", "points", "coordinates"]),
+    (RADIUS, &["radius", "radii", "radius_particle", "particle_radius"]),
+    (
+        PARTICLE_TYPE,
+        &["species", "type", "element", "particle type", "particle_type", "particletype"],
+    ),
+    (
+        PARTICLE_IDENTIFIER,
+        &[
+            "id",
+            "idp",
+            "particle identifier",
+            "particle_identifier",
+            "particle id",
+            "particle_id",
+            "particleid",
+            "particleids",
+            "identifier",
+        ],
+    ),
+    (
+        MOLECULE_IDENTIFIER,
+        &["mol", "molecule", "molecule identifier", "molecule_identifier", "molecule_id"],
+    ),
+    (VELOCITY, &["velocity", "velocities", "vel", "velo", "vels"]),
+    (
+        ANGULAR_VELOCITY,
+        &["omega", "angular velocity", "angular_velocity", "angularvelocity", "angvel"],
+    ),
+    (ANGULAR_MOMENTUM, &["angmom", "angular momentum", "angular_momentum"]),
+    (FORCE, &["force", "forces"]),
+    (TORQUE, &["torque", "torques", "tq"]),
+    (ACCELERATION, &["acceleration", "accelerations", "acc", "ace", "accel"]),
+    (MASS, &["mass", "masses"]),
+    (CHARGE, &["q", "charge", "charges"]),
+    (PERIODIC_IMAGE, &["periodic image", "periodic_image", "map_shift"]),
+    (COLOR, &["color", "colour", "colors", "rgb"]),
+    (TRANSPARENCY, &["transparency"]),
+    (ORIENTATION, &["orientation", "quaternion", "quat"]),
+    (NORMAL, &["normal", "normals"]),
+    (DIPOLE, &["dipole orientation", "dipole", "mu"]),
+];
+
+/// Spellings of the components of vectors, in lower case, x before y before z.
+const COMPONENTS: &[(&str, &[&str])] = &[
+    (VELOCITY, &["vx", "vy", "vz"]),
+    (FORCE, &["fx", "fy", "fz"]),
+    (ANGULAR_VELOCITY, &["omegax", "omegay", "omegaz"]),
+    (ANGULAR_VELOCITY, &["wx", "wy", "wz"]),
+    (ANGULAR_MOMENTUM, &["angmomx", "angmomy", "angmomz"]),
+    (TORQUE, &["tqx", "tqy", "tqz"]),
+    (DIPOLE, &["mux", "muy", "muz"]),
+    (PERIODIC_IMAGE, &["ix", "iy", "iz"]),
+    (ACCELERATION, &["ax", "ay", "az"]),
+    (NORMAL, &["nx", "ny", "nz"]),
+    (ORIENTATION, &["quati", "quatj", "quatk", "quatw"]),
+    (COLOR, &["r", "g", "b"]),
+    (COLOR, &["red", "green", "blue"]),
+];
+
+/// The standard name of a property that is spelled `name`, in any case.
+pub fn standard(name: &str) -> Option<&'static str> {
+    let name = name.to_ascii_lowercase();
+    SPELLINGS.iter().find(|(_, all)| all.contains(&name.as_str())).map(|(standard, _)| *standard)
+}
+
+/// The standard name and the component of a vector's component that is spelled `name`, in any case,
+/// and how many components that vector has.
+pub fn component(name: &str) -> Option<(&'static str, usize, usize)> {
+    let name = name.to_ascii_lowercase();
+    COMPONENTS.iter().find_map(|(standard, all)| {
+        all.iter().position(|n| *n == name).map(|i| (*standard, i, all.len()))
+    })
+}
