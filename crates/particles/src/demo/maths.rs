@@ -29,14 +29,14 @@ pub(super) fn exponential(seed: u64, i: u64) -> f64 {
 
 /// sin x for |x| below some thousands, to 1e-11.
 pub(super) fn sine(x: f64) -> f64 {
-    let half_turns = (x * (1.0 / PI)).round();
-    let r = x - half_turns * PI;
+    let half_turns = (x * (1.0 / PI) + if x < 0.0 { -0.5 } else { 0.5 }) as i64;
+    let r = x - half_turns as f64 * PI;
     let square = r * r;
     // r − r³/3! + r⁵/5! − … by Horner's rule: each term over the one before it.
     const RATIOS: [f64; 7] =
         [1.0 / 210.0, 1.0 / 156.0, 1.0 / 110.0, 1.0 / 72.0, 1.0 / 42.0, 1.0 / 20.0, 1.0 / 6.0];
     let series = RATIOS.iter().fold(1.0, |inner, ratio| 1.0 - square * ratio * inner);
-    if half_turns % 2.0 == 0.0 { r * series } else { -r * series }
+    if half_turns % 2 == 0 { r * series } else { -r * series }
 }
 
 /// cos x, as [`sine`].
