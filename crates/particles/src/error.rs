@@ -20,7 +20,7 @@ pub enum Place {
 }
 
 /// An error in a file, fit to be shown to the user as it is.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct ReadError {
     /// The file, as the user named it.
     pub path: PathBuf,

@@ -7,12 +7,16 @@
 //! Invariant: nothing here knows a camera, a scene or a picture.
 
 mod column;
+mod demo;
 mod error;
 mod particles;
 pub mod read;
+mod series;
 mod sim_box;
+mod source;
 
 pub use column::{Column, Values};
 pub use error::{Place, ReadError, Result};
 pub use particles::{Particles, PositionBuilder, Radius};
+pub use series::Series;
 pub use sim_box::SimulationBox;

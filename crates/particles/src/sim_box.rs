@@ -39,7 +39,7 @@ impl SimulationBox {
         let cx = c * cos_beta;
         let cy = c * (cos_alpha - cos_beta * cos_gamma) / sin_gamma;
         let cz2 = c * c - cx * cx - cy * cy;
-        if !(cz2 > 0.0) {
+        if cz2.is_nan() || cz2 <= 0.0 {
             return None;
         }
         Some(Self {
