@@ -1,1 +1,31 @@
-//! The front door.
+//! The front door of Motes: a particle file in, a ray-traced picture out.
+//!
+//! ```no_run
+//! let mut scene = motes::Scene::default();
+//! scene.set_sources(&["dump.lammpstrj".into()]);
+//! let mut session = motes::Session::open(scene, None)?;
+//! let picture = session.render(0, motes::Layers::No, &motes::Quiet)?;
+//! picture.save_png("out.png".as_ref())?;
+//! # Ok::<(), motes::Error>(())
+//! ```
+//!
+//! The command line (`main.rs`) is a user of this library like any other.
+
+mod annotate;
+mod error;
+mod expression;
+mod info;
+mod paint;
+mod picture;
+mod radius;
+mod session;
+mod stats;
+mod system;
+
+pub use error::{Error, Result};
+pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
+pub use motes_frame::Frame;
+pub use motes_scene::Scene;
+pub use picture::Picture;
+pub use session::{Layers, Quiet, Session, Watch};
+pub use stats::{Stats, peak_memory_bytes};

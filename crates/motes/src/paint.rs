@@ -1,0 +1,354 @@
+//! What colour each particle has.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use motes_particles::read::names;
+use motes_particles::{Column, Particles, Radius, Values};
+use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, nearest};
+
+use crate::{Error, Result};
+
+/// The colours of one system's particles.
+#[derive(Clone, Debug)]
+pub(crate) struct Paint {
+    particles: Arc<Particles>,
+    how: How,
+    /// What the colours mean, for the legend.
+    pub meaning: Meaning,
+}
+
+#[derive(Clone, Debug)]
+enum How {
+    Uniform(Vec3),
+    /// The colours of the file: a column, and the factor that brings it to 0..=1.
+    Own { column: usize, scale: f64 },
+    /// A kind per particle, and the colours of the kinds.
+    Kinds { kinds: Vec<u32>, colors: Vec<Vec3> },
+    Mapped(Mapped),
+}
+
+/// A property through a colour map.
+#[derive(Clone, Debug)]
+struct Mapped {
+    property: Property,
+    low: f64,
+    /// 1 / (high − low); 0 where they are equal.
+    scale: f64,
+    log: bool,
+    table: Box<[Vec3; 256]>,
+    missing: Vec3,
+}
+
+/// What colours mean.
+#[derive(Clone, Debug)]
+pub(crate) enum Meaning {
+    /// Nothing.
+    Nothing,
+    /// Values between two ends.
+    Range { title: String, range: [f64; 2], colors: Vec<[f32; 3]>, log: bool },
+    /// Names, each with its colour.
+    Categories { title: String, entries: Vec<(String, Vec3)> },
+}
+
+/// A number of each particle: a column's component or magnitude, a coordinate, the radius.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Property {
+    Column { index: usize, component: Option<usize> },
+    Position(Option<usize>),
+    Radius,
+}
+
+impl Property {
+    /// Finds the property called `name`; the component is the scene's, or the name's own suffix
+    /// (`Velocity.X`, `Velocity[0]`, `Velocity.Magnitude`).
+    ///
+    /// # Errors
+    /// There is no such property; the nearest name is given.
+    pub fn find(particles: &Particles, name: &str, component: Component) -> Result<Self> {
+        let own = component_number(component);
+        if let Some(found) = Self::exactly(particles, name, own) {
+            return Ok(found);
+        }
+        if let Some((stem, suffix)) = split_component(name)
+            && let Some(found) = Self::exactly(particles, stem, suffix)
+        {
+            return Ok(found);
+        }
+        let known: Vec<&str> = particles.columns.iter().map(|c| c.name.as_str()).collect();
+        let all = [names::POSITION, names::RADIUS].into_iter().chain(known.iter().copied());
+        let hint = nearest(name, all.clone()).map(|n| format!("; did you mean `{n}`?"));
+        let list = all.collect::<Vec<_>>().join(", ");
+        Err(Error::Usage(format!(
+            "no property `{name}`{}; there are {list}",
+            hint.unwrap_or_default()
+        )))
+    }
+
+    fn exactly(particles: &Particles, name: &str, component: Option<usize>) -> Option<Self> {
+        if name.eq_ignore_ascii_case(names::POSITION) {
+            return Some(Self::Position(component));
+        }
+        if name.eq_ignore_ascii_case(names::RADIUS) && particles.radius != Radius::Unknown {
+            return Some(Self::Radius);
+        }
+        let columns = particles.columns.iter();
+        let index = columns
+            .clone()
+            .position(|c| c.name == name)
+            .or_else(|| columns.clone().position(|c| c.name.eq_ignore_ascii_case(name)))?;
+        let fits = component.is_none_or(|c| c < particles.columns[index].components);
+        let component = if particles.columns[index].components == 1 { Some(0) } else { component };
+        fits.then_some(Self::Column { index, component })
+    }
+
+    /// The value of particle `row`.
+    pub fn value(&self, particles: &Particles, row: usize) -> f64 {
+        match *self {
+            Self::Column { index, component: Some(c) } => particles.columns[index].number(row, c),
+            Self::Column { index, component: None } => particles.columns[index].magnitude(row),
+            Self::Position(Some(axis)) => {
+                particles.origin[axis] + f64::from(particles.positions[row][axis])
+            }
+            Self::Position(None) => (0..3)
+                .map(|axis| {
+                    (particles.origin[axis] + f64::from(particles.positions[row][axis])).powi(2)
+                })
+                .sum::<f64>()
+                .sqrt(),
+            Self::Radius => match &particles.radius {
+                Radius::Each(radii) => f64::from(radii[row]),
+                Radius::Uniform(r) => f64::from(*r),
+                Radius::Unknown => f64::NAN,
+            },
+        }
+    }
+
+    /// Least and greatest finite value, positive ones only if `positive`.
+    pub fn range(&self, particles: &Particles, positive: bool) -> Option<[f64; 2]> {
+        (0..particles.len())
+            .map(|row| self.value(particles, row))
+            .filter(|v| v.is_finite() && (!positive || *v > 0.0))
+            .fold(None, |range, v| match range {
+                None => Some([v, v]),
+                Some([low, high]) => Some([v.min(low), v.max(high)]),
+            })
+    }
+}
+
+fn component_number(component: Component) -> Option<usize> {
+    match component {
+        Component::X => Some(0),
+        Component::Y => Some(1),
+        Component::Z => Some(2),
+        Component::Magnitude => None,
+    }
+}
+
+/// `Velocity.X` → (`Velocity`, 0); `Stress[4]` → (`Stress`, 4); `Velocity.Magnitude` → no component.
+pub(crate) fn split_component(name: &str) -> Option<(&str, Option<usize>)> {
+    if let Some((stem, index)) = name.strip_suffix(']').and_then(|n| n.rsplit_once('[')) {
+        return index.parse().ok().map(|i| (stem, Some(i)));
+    }
+    let (stem, suffix) = name.rsplit_once('.')?;
+    let component = match suffix.to_ascii_lowercase().as_str() {
+        "x" | "r" | "1" => Some(0),
+        "y" | "g" | "2" => Some(1),
+        "z" | "b" | "3" => Some(2),
+        "w" | "4" => Some(3),
+        "magnitude" => None,
+        _ => return None,
+    };
+    Some((stem, component))
+}
+
+impl Paint {
+    /// The paint of `particles` under `coloring`; `range` overrides the frame's own range, such as the
+    /// whole series'.
+    ///
+    /// # Errors
+    /// No such property or colour map.
+    pub fn new(
+        particles: &Arc<Particles>,
+        coloring: &Coloring,
+        range: Option<[f64; 2]>,
+    ) -> Result<Self> {
+        let (how, meaning) = match &coloring.by {
+            ColorBy::Auto => automatic(particles, coloring),
+            ColorBy::Uniform => uniform(coloring),
+            ColorBy::Element | ColorBy::Type => {
+                let types = category_column(particles, &[names::PARTICLE_TYPE])?;
+                categories(types, coloring, coloring.by == ColorBy::Element)
+            }
+            ColorBy::Chain => {
+                let of = [names::CHAIN, names::MOLECULE_IDENTIFIER];
+                categories(category_column(particles, &of)?, coloring, false)
+            }
+            ColorBy::Property(name) => by_property(particles, coloring, name, range)?,
+        };
+        Ok(Self { particles: particles.clone(), how, meaning })
+    }
+
+    /// The colour of particle `index`, linear RGB.
+    pub fn color(&self, index: u32) -> Vec3 {
+        match &self.how {
+            How::Uniform(color) => *color,
+            How::Own { column, scale } => {
+                own_color(&self.particles.columns[*column], index as usize, *scale)
+            }
+            How::Kinds { kinds, colors } => colors[kinds[index as usize] as usize],
+            How::Mapped(mapped) => mapped.color(&self.particles, index as usize),
+        }
+    }
+}
+
+impl Mapped {
+    fn color(&self, particles: &Particles, row: usize) -> Vec3 {
+        let value = self.property.value(particles, row);
+        let value = if self.log { value.max(f64::MIN_POSITIVE).ln() } else { value };
+        if value.is_nan() {
+            return self.missing;
+        }
+        let t = ((value - self.low) * self.scale).clamp(0.0, 1.0) * 255.0;
+        let at = (t as usize).min(254);
+        self.table[at].lerp(self.table[at + 1], (t - at as f64) as f32)
+    }
+}
+
+fn uniform(coloring: &Coloring) -> (How, Meaning) {
+    (How::Uniform(Vec3::from(coloring.uniform.linear())), Meaning::Nothing)
+}
+
+/// The file's own colours, else elements, else types where there are several, else one colour.
+fn automatic(particles: &Particles, coloring: &Coloring) -> (How, Meaning) {
+    let own = |c: &Column| c.name == names::COLOR && c.components >= 3;
+    if let Some(column) = particles.columns.iter().position(own) {
+        let bytes = matches!(particles.columns[column].values, Values::U8(_));
+        let scale = if bytes { 1.0 / 255.0 } else { 1.0 };
+        return (How::Own { column, scale }, Meaning::Nothing);
+    }
+    match particles.column(names::PARTICLE_TYPE) {
+        Some(types) => {
+            let elements = matches!(&types.values, Values::Names { names, .. }
+                if names.iter().all(|n| Element::by_symbol(n).is_some()));
+            let (how, meaning) = categories(types, coloring, elements);
+            match &meaning {
+                Meaning::Categories { entries, .. } if entries.len() == 1 && !elements => {
+                    uniform(coloring)
+                }
+                _ => (how, meaning),
+            }
+        }
+        None => uniform(coloring),
+    }
+}
+
+/// A colour the file gives, in sRGB.
+fn own_color(column: &Column, row: usize, scale: f64) -> Vec3 {
+    let channel = |c| {
+        motes_scene::linear_from_srgb((column.number(row, c) * scale).clamp(0.0, 1.0) as f32)
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
+}
+
+fn category_column<'a>(particles: &'a Particles, of: &[&str]) -> Result<&'a Column> {
+    of.iter().find_map(|name| particles.column(name)).ok_or_else(|| {
+        let wanted = of.join(" or ");
+        Error::Usage(format!("cannot colour by {wanted}: the particles have no such property"))
+    })
+}
+
+/// Distinct colours for names or whole numbers.
+fn categories(column: &Column, coloring: &Coloring, elements: bool) -> (How, Meaning) {
+    let (kinds, names) = kinds_of(column);
+    let color = |(i, name): (usize, &String)| {
+        let given = coloring.colors.get(name).copied();
+        let element = || Element::by_symbol(name).filter(|_| elements).map(|e| e.color);
+        let color = given.or_else(element).unwrap_or_else(|| coloring.palette.color(i));
+        Vec3::from(color.linear())
+    };
+    let colors: Vec<Vec3> = names.iter().enumerate().map(color).collect();
+    let entries = names.into_iter().zip(colors.iter().copied()).collect();
+    let meaning = Meaning::Categories { title: column.name.clone(), entries };
+    (How::Kinds { kinds, colors }, meaning)
+}
+
+/// The kind of each particle, counted from 0, and the kinds' names: names in order of appearance,
+/// numbers in ascending order.
+fn kinds_of(column: &Column) -> (Vec<u32>, Vec<String>) {
+    if let Values::Names { codes, names } = &column.values {
+        return (codes.clone(), names.clone());
+    }
+    let mut numbers: Vec<f64> = Vec::new();
+    let mut kind_of = std::collections::HashMap::new();
+    let rows = 0..column.rows();
+    for number in rows.clone().map(|row| column.number(row, 0)) {
+        if kind_of.insert(number.to_bits(), 0).is_none() {
+            numbers.push(number);
+        }
+    }
+    numbers.sort_by(f64::total_cmp);
+    for (kind, number) in numbers.iter().enumerate() {
+        kind_of.insert(number.to_bits(), kind as u32);
+    }
+    let kinds = rows.map(|row| kind_of[&column.number(row, 0).to_bits()]).collect();
+    (kinds, numbers.into_iter().map(|n| n.to_string()).collect())
+}
+
+fn by_property(
+    particles: &Particles,
+    coloring: &Coloring,
+    name: &str,
+    range: Option<[f64; 2]>,
+) -> Result<(How, Meaning)> {
+    let property = Property::find(particles, name, coloring.component)?;
+    if let Property::Column { index, .. } = property
+        && let column = &particles.columns[index]
+        && let Values::Names { .. } = column.values
+    {
+        return Ok(categories(column, coloring, false));
+    }
+    let map = ColorMap::by_name(&coloring.map)?;
+    let map = if coloring.reverse { map.reversed() } else { map };
+    let range = coloring.range.or(range).or_else(|| property.range(particles, coloring.log));
+    let range = range.unwrap_or([0.0, 1.0]);
+    let along = |v: f64| if coloring.log { v.max(f64::MIN_POSITIVE).ln() } else { v };
+    let [low, high] = range.map(along);
+    let table = map.linear_table();
+    let mapped = Mapped {
+        property,
+        low,
+        scale: if high != low { 1.0 / (high - low) } else { 0.0 },
+        log: coloring.log,
+        table: Box::new(table.map(Vec3::from)),
+        missing: Vec3::from(coloring.missing.linear()),
+    };
+    let title = title_of(particles, property, name);
+    let meaning =
+        Meaning::Range { title, range, colors: table.to_vec(), log: coloring.log };
+    Ok((How::Mapped(mapped), meaning))
+}
+
+/// The property's name with the component that is shown.
+fn title_of(particles: &Particles, property: Property, name: &str) -> String {
+    let stem = match property {
+        Property::Column { index, .. } => particles.columns[index].name.clone(),
+        Property::Position(_) => names::POSITION.into(),
+        Property::Radius => return names::RADIUS.into(),
+    };
+    let components = match property {
+        Property::Column { index, .. } => particles.columns[index].components,
+        _ => 3,
+    };
+    match property {
+        Property::Column { component, .. } | Property::Position(component) if components > 1 => {
+            match component {
+                Some(c @ 0..3) if components <= 4 => format!("{stem} {}", ["x", "y", "z"][c]),
+                Some(c) => format!("{stem} [{c}]"),
+                None => format!("{stem} magnitude"),
+            }
+        }
+        _ if stem.is_empty() => name.into(),
+        _ => stem,
+    }
+}

@@ -1,0 +1,120 @@
+//! How large each particle is: the file's radius, else the element's, else half the spacing.
+
+use std::collections::HashMap;
+
+use motes_grid::{Grid, Radii, RadiusClasses};
+use motes_particles::read::names;
+use motes_particles::{Column, Particles, Radius, Values};
+use motes_scene::{Element, System};
+
+/// The radius of particles that have no neighbour to measure by.
+const LONE_RADIUS: f32 = 0.5;
+
+/// Where a system's radii come from, before scaling.
+#[derive(Debug)]
+pub(crate) enum Rule {
+    /// One radius for all.
+    Uniform(f32),
+    /// One radius each, in the file's order.
+    Each(Vec<f32>),
+    /// Half the median distance to the nearest neighbour: known once there is a grid.
+    HalfSpacing,
+}
+
+/// The rule for `particles`: `radius` of the scene; else, per type, `radii` of the scene; else the
+/// file's; else the element's; else half the spacing.
+pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
+    if let Some(radius) = system.radius {
+        return Rule::Uniform(radius as f32);
+    }
+    let types = particles.column(names::PARTICLE_TYPE);
+    let given = (!system.radii.is_empty()).then_some(types).flatten().map(|column| {
+        per_type(column, |name| system.radii.get(name).map(|r| *r as f32))
+    });
+    let rest = match &particles.radius {
+        Radius::Uniform(r) => Rule::Uniform(*r),
+        Radius::Each(radii) => Rule::Each(radii.clone()),
+        Radius::Unknown => types.and_then(of_elements).map_or(Rule::HalfSpacing, Rule::Each),
+    };
+    match (given, rest) {
+        (None, rest) => rest,
+        (Some(given), rest) => {
+            let other = |i: usize| match &rest {
+                Rule::Uniform(r) => *r,
+                Rule::Each(radii) => radii[i],
+                Rule::HalfSpacing => LONE_RADIUS,
+            };
+            let radii = given.iter().enumerate();
+            Rule::Each(radii.map(|(i, r)| r.unwrap_or_else(|| other(i))).collect())
+        }
+    }
+}
+
+/// The radius of an element: Bondi's van der Waals radius for what molecules are made of, else
+/// Cordero's covalent radius, as metals touch their neighbours.
+fn element_radius(symbol: &str) -> Option<f32> {
+    const MOLECULAR: [&str; 17] = [
+        "H", "D", "T", "He", "C", "N", "O", "F", "Ne", "P", "S", "Cl", "Ar", "Se", "Br", "Kr", "I",
+    ];
+    let element = Element::by_symbol(symbol)?;
+    let radius = if MOLECULAR.contains(&element.symbol) {
+        element.vdw_radius
+    } else {
+        element.covalent_radius.or(element.vdw_radius)
+    };
+    radius.map(|r| r as f32)
+}
+
+/// Radii by element, where every particle's type is one.
+fn of_elements(types: &Column) -> Option<Vec<f32>> {
+    let Values::Names { .. } = types.values else { return None };
+    per_type(types, element_radius).into_iter().collect()
+}
+
+/// A value per particle from its type's name (or number, as text).
+pub(crate) fn per_type<T: Copy>(
+    types: &Column,
+    value: impl Fn(&str) -> Option<T>,
+) -> Vec<Option<T>> {
+    match &types.values {
+        Values::Names { codes, names } => {
+            let values: Vec<Option<T>> = names.iter().map(|name| value(name)).collect();
+            codes.iter().map(|code| values[*code as usize]).collect()
+        }
+        _ => {
+            let mut known: HashMap<u64, Option<T>> = HashMap::new();
+            (0..types.rows())
+                .map(|row| {
+                    let number = types.number(row, 0);
+                    *known.entry(number.to_bits()).or_insert_with(|| value(&number.to_string()))
+                })
+                .collect()
+        }
+    }
+}
+
+/// Builds the grids of a system under its rule.
+pub(crate) fn classes(
+    positions: &[[f32; 3]],
+    rule: Rule,
+    scale: f32,
+    params: motes_grid::Params,
+) -> RadiusClasses {
+    match rule {
+        Rule::Uniform(r) => RadiusClasses::build(positions, Radii::Uniform(r * scale), params),
+        Rule::Each(mut radii) => {
+            radii.iter_mut().for_each(|r| *r *= scale);
+            RadiusClasses::build(positions, Radii::Each(&radii), params)
+        }
+        Rule::HalfSpacing => {
+            // The least radius there is lets the grid be as fine as λ says.
+            let mut grid =
+                Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
+            let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
+            grid.set_radius(radius * scale);
+            let left_out = positions.len() - grid.len();
+            let grids = if grid.is_empty() { vec![] } else { vec![grid] };
+            RadiusClasses { grids, left_out }
+        }
+    }
+}

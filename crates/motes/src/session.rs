@@ -1,0 +1,339 @@
+//! A scene with its sources open: frames on demand.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use fearless_simd::Level;
+use glam::{DVec3, Vec3};
+use motes_frame::{Background, Curve, Frame, Layer, Tone};
+use motes_particles::Series;
+use motes_particles::read::{Wanted, names};
+use motes_scene::{Bounds, ColorBy, RangeOver, Resolved, Scene, Show};
+use motes_spheres::{Center, Settings, Spheres, View};
+
+use crate::annotate::{Annotated, annotations, frames_box};
+use crate::paint::{Property, split_component};
+use crate::picture::Picture;
+use crate::stats::{Stats, peak_memory_bytes};
+use crate::system::Loaded;
+use crate::{Error, Result};
+
+/// Whether a picture carries depth, normal, id and system besides colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layers {
+    /// Colour only.
+    No,
+    /// All of them.
+    Yes,
+}
+
+/// Is told of long work, from any thread.
+pub trait Watch: Sync {
+    /// `done` of `total` of the work called `stage` are done (bytes read, tiles drawn). `false` cancels
+    /// what can be cancelled.
+    fn progress(&self, stage: &'static str, done: u64, total: u64) -> bool;
+}
+
+/// Watches nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Quiet;
+
+impl Watch for Quiet {
+    fn progress(&self, _: &'static str, _: u64, _: u64) -> bool {
+        true
+    }
+}
+
+/// A scene whose sources are open.
+pub struct Session {
+    scene: Scene,
+    series: Vec<Series>,
+    pool: Option<rayon::ThreadPool>,
+    /// Colour range per system over its whole series, once it was asked for.
+    ranges: Vec<Option<[f64; 2]>>,
+}
+
+impl Session {
+    /// Opens the sources of the scene's systems; `threads` defaults to the machine's.
+    ///
+    /// # Errors
+    /// The scene makes no sense, names no source, or a source cannot be opened.
+    pub fn open(scene: Scene, threads: Option<usize>) -> Result<Self> {
+        scene.check()?;
+        let pool = threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build());
+        let pool = pool.transpose().map_err(|e| Error::Usage(format!("threads: {e}")))?;
+        let open = |source: &str| match source {
+            "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
+            _ => Ok(Series::open(source)?),
+        };
+        let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let ranges = vec![None; series.len()];
+        Ok(Self { scene, series, pool, ranges })
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// How many frames there are: those of the longest series.
+    ///
+    /// # Errors
+    /// A source cannot be read.
+    pub fn frames(&mut self, watch: &dyn Watch) -> Result<usize> {
+        let report = |done, total| _ = watch.progress("count", done, total);
+        let counts = self.series.iter_mut().map(|s| s.frames(&report));
+        Ok(counts.collect::<motes_particles::Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
+    }
+
+    /// What was odd in the sources but could be read.
+    pub fn warnings(&self) -> Vec<String> {
+        self.series.iter().flat_map(Series::warnings).collect()
+    }
+
+    /// Renders frame `frame`.
+    ///
+    /// # Errors
+    /// The frame cannot be read, a property is not there, or the watch cancels.
+    pub fn render(&mut self, frame: usize, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+        // The pool is taken out for the call, as the work needs all of the session.
+        match self.pool.take() {
+            Some(pool) => {
+                let picture = pool.install(|| self.render_here(frame, layers, watch));
+                self.pool = Some(pool);
+                picture
+            }
+            None => self.render_here(frame, layers, watch),
+        }
+    }
+
+    fn render_here(&mut self, frame: usize, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+        let mut stats = Stats { threads: rayon::current_num_threads(), ..Stats::default() };
+        let start = Instant::now();
+        let particles = self.read(frame, watch)?;
+        stats.ms.insert("read", milliseconds(start));
+
+        let start = Instant::now();
+        let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
+        let mut loaded = Vec::new();
+        for (i, particles) in particles.into_iter().enumerate() {
+            let Some(particles) = particles else { continue };
+            let of = (&self.scene, &self.scene.system[i]);
+            loaded.push(Loaded::new(particles, of, origin, self.ranges[i])?);
+        }
+        stats.ms.insert("build", milliseconds(start));
+
+        let resolved = self.scene.resolve(bounds(&loaded, origin, self.scene.overlay.r#box))?;
+        let start = Instant::now();
+        let raw = self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?;
+        stats.ms.insert("trace", milliseconds(start));
+
+        let start = Instant::now();
+        let shown = self.finish(&raw, &resolved, &annotated(&loaded, origin, frame, self));
+        stats.ms.insert("finish", milliseconds(start));
+        count(&mut stats, &loaded);
+        stats.hash = format!("{:016x}", raw.hash());
+        stats.peak_memory = peak_memory_bytes();
+        Ok(Picture { raw, shown, stats, scene: self.scene.to_toml()?, transparent: self.scene.image.transparent })
+    }
+
+    /// Reads the frame of every visible system; `None` for hidden ones.
+    fn read(&mut self, frame: usize, watch: &dyn Watch) -> Result<Vec<Option<Arc<motes_particles::Particles>>>> {
+        let report = |done, total| _ = watch.progress("read", done, total);
+        let mut all = Vec::new();
+        for i in 0..self.series.len() {
+            let system = &self.scene.system[i];
+            if !system.visible {
+                all.push(None);
+                continue;
+            }
+            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(system.frame_offset);
+            let own = usize::try_from(own).map_err(|_| {
+                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
+            })?;
+            let wanted = wanted(system);
+            if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
+                self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
+            }
+            all.push(Some(self.series[i].frame(own, &wanted, &report)?));
+        }
+        Ok(all)
+    }
+
+    fn trace(
+        &self,
+        loaded: &[Loaded],
+        (resolved, origin): (&Resolved, DVec3),
+        layers: Layers,
+        (stats, watch): (&mut Stats, &dyn Watch),
+    ) -> Result<Frame> {
+        let level = Level::new();
+        stats.simd = instruction_set(level).into();
+        let systems: Vec<Spheres<'_>> = loaded
+            .iter()
+            .map(|l| Spheres { classes: &l.classes, visible: &l.visible })
+            .collect();
+        let rays = resolved.view.rays(origin);
+        let view = View {
+            rays: &rays,
+            systems: &systems,
+            paint: &Paints(loaded),
+            lights: &resolved.lights,
+        };
+        let image = &self.scene.image;
+        let settings = Settings {
+            size: (image.width, image.height),
+            samples: image.samples,
+            packet: self.scene.spheres.packet,
+            // Lines in space are hidden by depth.
+            layers: true,
+            level,
+        };
+        let tell = |done, total| watch.progress("render", done, total);
+        let traced = motes_spheres::render(view, settings, &tell).ok_or(Error::Cancelled)?;
+        stats.counts.insert("tests", traced.counts.tests);
+        stats.counts.insert("spheres", traced.counts.spheres);
+        let _ = layers;
+        Ok(with_layers(Frame::new(image.width as usize, image.height as usize, traced.color)?, &traced.center)?)
+    }
+
+    /// Tone, background and annotations.
+    fn finish(&self, raw: &Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
+        let image = &self.scene.image;
+        let mut shown = raw.clone();
+        let curve = match image.tone {
+            motes_scene::Tone::None => Curve::Standard,
+            motes_scene::Tone::Filmic => Curve::Filmic,
+        };
+        Tone { exposure: image.exposure as f32, curve }.apply(&mut shown);
+        let background = match (image.transparent, image.background_bottom) {
+            (true, _) => Background::Transparent,
+            (false, None) => Background::Solid(resolved.background.top.to_array()),
+            (false, Some(_)) => Background::Gradient {
+                top: resolved.background.top.to_array(),
+                bottom: resolved.background.bottom.to_array(),
+            },
+        };
+        background.put_behind(&mut shown);
+        annotations(&self.scene, resolved, annotated).draw(&mut shown);
+        shown
+    }
+}
+
+/// The colours of all systems.
+struct Paints<'a>(&'a [Loaded]);
+
+impl motes_spheres::Paint for Paints<'_> {
+    fn color(&self, system: u16, index: u32) -> Vec3 {
+        self.0[system as usize].paint.color(index)
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+/// The columns that colours, radii and filters need.
+fn wanted(system: &motes_scene::System) -> Wanted {
+    let mut wanted: Vec<String> = vec![names::PARTICLE_TYPE.into()];
+    let mut add = |name: &str| {
+        wanted.push(name.into());
+        wanted.extend(split_component(name).map(|(stem, _)| stem.to_owned()));
+    };
+    match &system.color.by {
+        ColorBy::Auto => add(names::COLOR),
+        ColorBy::Chain => {
+            add(names::CHAIN);
+            add(names::MOLECULE_IDENTIFIER);
+        }
+        ColorBy::Property(name) => add(name),
+        ColorBy::Uniform | ColorBy::Element | ColorBy::Type => {}
+    }
+    system.filter.iter().for_each(|f| add(&f.property));
+    // A name that is spelled in another case, or an expression, may mean any column.
+    let exact = system.r#where.trim().is_empty()
+        && system.filter.is_empty()
+        && !matches!(system.color.by, ColorBy::Property(_));
+    if exact { Wanted::Only(wanted) } else { Wanted::All }
+}
+
+/// The range of the colouring property over all frames.
+fn series_range(
+    series: &mut Series,
+    system: &motes_scene::System,
+    wanted: &Wanted,
+    watch: &dyn Watch,
+) -> Result<Option<[f64; 2]>> {
+    let ColorBy::Property(name) = &system.color.by else { return Ok(None) };
+    let quiet = |_, _| {};
+    let frames = series.frames(&quiet)?;
+    let mut range: Option<[f64; 2]> = None;
+    for frame in 0..frames {
+        if !watch.progress("range", frame as u64, frames as u64) {
+            return Err(Error::Cancelled);
+        }
+        let particles = series.frame(frame, wanted, &quiet)?;
+        // Frames without particles may come without columns.
+        if particles.is_empty() {
+            continue;
+        }
+        let property = Property::find(&particles, name, system.color.component)?;
+        if let Some([low, high]) = property.range(&particles, system.color.log) {
+            let [a, b] = range.unwrap_or([low, high]);
+            range = Some([a.min(low), b.max(high)]);
+        }
+    }
+    Ok(range)
+}
+
+/// The box around all that is to be framed.
+fn bounds(loaded: &[Loaded], origin: DVec3, show_box: Show) -> Option<Bounds> {
+    let of_box = |l: &Loaded| {
+        let corners = l.particles.sim_box.filter(|_| frames_box(&l.particles, show_box))?.corners();
+        Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
+    };
+    loaded.iter().flat_map(|l| [l.bounds(origin), of_box(l)]).flatten().reduce(Bounds::union)
+}
+
+fn annotated<'a>(loaded: &'a [Loaded], origin: DVec3, frame: usize, session: &'a Session) -> Annotated<'a> {
+    let _ = (origin, session);
+    Annotated { systems: loaded, frame }
+}
+
+fn with_layers(frame: Frame, center: &[Center]) -> Result<Frame> {
+    Ok(frame
+        .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
+        .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
+        .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
+        .with(Layer::System(center.iter().map(|c| c.system).collect()))?)
+}
+
+fn count(stats: &mut Stats, loaded: &[Loaded]) {
+    let sum = |f: &dyn Fn(&Loaded) -> usize| loaded.iter().map(f).sum::<usize>();
+    let grids = |f: &dyn Fn(&motes_grid::Grid) -> usize| {
+        sum(&|l| l.classes.grids.iter().map(f).sum::<usize>())
+    };
+    stats.particles.insert("read", sum(&|l| l.particles.len()));
+    stats.particles.insert("visible", sum(&|l| l.count_visible()));
+    stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
+    stats.bytes.insert("input", sum(&|l| l.particles.bytes()));
+    stats.bytes.insert("data", grids(&|g| g.data_bytes()));
+    stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
+    stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));
+}
+
+fn instruction_set(level: Level) -> &'static str {
+    match level {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512(_) => "AVX-512",
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2(_) => "AVX2",
+        #[cfg(target_arch = "x86_64")]
+        Level::Sse4_2(_) => "SSE4.2",
+        #[cfg(target_arch = "x86_64")]
+        Level::Sse2(_) => "SSE2",
+        #[cfg(target_arch = "aarch64")]
+        Level::Neon(_) => "NEON",
+        _ => "scalar",
+    }
+}
