@@ -10,6 +10,9 @@
 mod bounds;
 mod camera;
 mod color;
+mod color_points;
+mod colormap;
+mod elements;
 mod error;
 mod resolve;
 mod scene;
@@ -20,6 +23,8 @@ mod text;
 pub use bounds::Bounds;
 pub use camera::{CameraView, Projected, Rays};
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
+pub use colormap::ColorMap;
+pub use elements::Element;
 pub use error::{Result, SceneError, nearest};
 pub use resolve::{Background, KeyLight, Lights, Resolved};
 pub use scene::{

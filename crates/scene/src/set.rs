@@ -65,8 +65,8 @@ fn find<'a>(shape: &'a Shape, names: &[&str]) -> Option<&'a Shape> {
     match shape {
         Shape::Value(_) => None,
         Shape::Map(of) => find(of, rest),
-        Shape::List(of) if name.parse::<usize>().is_ok() => find(of, rest),
-        Shape::List(of) => find(of, names),
+        Shape::List(of, _) if name.parse::<usize>().is_ok() => find(of, rest),
+        Shape::List(of, _) => find(of, names),
         Shape::Table(fields) => find(&fields.iter().find(|f| f.name == *name)?.shape, rest),
     }
 }
@@ -87,7 +87,7 @@ fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: &Value) -> 
     let path = join(target.path, name);
     let next = Target { names: rest, path: &path };
     match (shape, value) {
-        (Shape::List(of), Value::Array(items)) => match name.parse::<usize>() {
+        (Shape::List(of, _), Value::Array(items)) => match name.parse::<usize>() {
             Ok(index) => {
                 let count = items.len();
                 let item = items.get_mut(index).ok_or_else(|| {
@@ -140,7 +140,7 @@ fn paths(shape: &Shape, path: &str, out: &mut Vec<String>) {
         Shape::Table(fields) => {
             fields.iter().for_each(|f| paths(&f.shape, &join(path, f.name), out));
         }
-        Shape::List(of) => paths(of, path, out),
+        Shape::List(of, _) => paths(of, path, out),
         Shape::Value(_) | Shape::Map(_) => out.push(path.into()),
     }
 }
