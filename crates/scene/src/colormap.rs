@@ -6,7 +6,7 @@ use colorous::Gradient;
 
 use crate::color::{Color, linear_from_srgb};
 use crate::color_points::{POINTS, Points};
-use crate::error::{Result, SceneError, hint};
+use crate::error::{Result, SceneError, hint, quoted};
 use crate::scene::Palette;
 
 /// The maps from `colorous`: viridis and its family, d3's cyclic sinebow, and ColorBrewer's, smoothed by
@@ -23,7 +23,6 @@ const GRADIENTS: &[(&str, Gradient)] = &[
     ("rdylbu", colorous::RED_YELLOW_BLUE),
     ("brbg", colorous::BROWN_GREEN),
     ("piyg", colorous::PINK_GREEN),
-    ("puor", colorous::PURPLE_ORANGE),
     ("ylgnbu", colorous::YELLOW_GREEN_BLUE),
     ("ylorrd", colorous::YELLOW_ORANGE_RED),
     ("blues", colorous::BLUES),
@@ -81,7 +80,7 @@ impl ColorMap {
             (None, None) => {
                 return Err(SceneError::UnknownName {
                     kind: "colour map",
-                    name: name.into(),
+                    name: quoted(name),
                     hint: hint(base, Self::names()),
                 });
             }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use crate::error::{Result, SceneError, hint};
+use crate::error::{Result, SceneError, hint, quoted};
 use crate::scene::Scene;
 use crate::settings::{Field, Setting, Shape};
 
@@ -83,7 +83,7 @@ impl Unknown {
                         let place =
                             if path.is_empty() { String::new() } else { format!(" in {path}") };
                         let hint = hint(name, fields.iter().map(|f| f.name));
-                        let reason = format!("no parameter `{name}`{place}{hint}");
+                        let reason = format!("no parameter `{}`{place}{hint}", quoted(name));
                         return Some(Self { span: key.span(), reason });
                     }
                 },
@@ -125,7 +125,7 @@ fn type_error(text: &str, error: &toml::de::Error, values: &[ValueAt]) -> SceneE
             "{}: expected {}, found {} ({})",
             v.path,
             v.shape.expected(),
-            text.get(v.span.clone()).unwrap_or("something else"),
+            quoted(text.get(v.span.clone()).unwrap_or("something else")),
             error.message().replace('\n', "; ")
         ),
         None => error.message().replace('\n', "; "),
@@ -283,5 +283,22 @@ mod tests {
         scene.system.clear();
         scene.set_sources(&["c".into()]);
         assert_eq!(scene.system, [crate::System { source: "c".into(), ..Default::default() }]);
+    }
+
+    #[test]
+    fn no_text_panics() {
+        let text = Scene::documented_toml();
+        for (at, _) in text.char_indices().step_by(7) {
+            // Whatever is left is a scene or an error that names a line of it.
+            if let Err(SceneError::Text { line, .. }) = Scene::from_toml(&text[..at]) {
+                assert!(line <= 1 + text[..at].matches('\n').count());
+            }
+        }
+        let deep = "[".repeat(100_000);
+        for bad in [format!("system = {deep}"), deep, "image.".repeat(100_000), "\u{0}".into()] {
+            assert!(Scene::from_toml(&bad).is_err());
+            assert!(Scene::default().set("image", &bad).is_err());
+            assert!(Scene::default().set(&bad, "1").is_err());
+        }
     }
 }
