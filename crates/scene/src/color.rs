@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use crate::error::{Result, SceneError, hint};
+use crate::error::{Result, SceneError, hint, quoted};
 use crate::settings::{Setting, Shape};
 
 /// A colour in sRGB, each channel in 0..=1, as one picks it on a screen.
@@ -63,7 +63,7 @@ impl Color {
         names.iter().find(|(n, _)| n.eq_ignore_ascii_case(text)).map(|n| Self::hex(n.1)).ok_or_else(
             || SceneError::UnknownName {
                 kind: "colour",
-                name: text.into(),
+                name: quoted(text),
                 hint: hint(text, names.iter().map(|n| n.0)),
             },
         )

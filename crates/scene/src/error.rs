@@ -51,17 +51,34 @@ impl SceneError {
         expected: impl Into<String>,
         found: impl ToString,
     ) -> Self {
-        Self::Value { path: path.into(), expected: expected.into(), found: found.to_string() }
+        Self::Value {
+            path: path.into(),
+            expected: expected.into(),
+            found: quoted(&found.to_string()),
+        }
     }
+}
+
+/// Longest word that is compared or quoted whole, bytes: no name is longer.
+const LONGEST: usize = 200;
+
+/// `text` for an error's message: long text is cut.
+pub(crate) fn quoted(text: &str) -> String {
+    let end = text.floor_char_boundary(LONGEST);
+    format!("{}{}", &text[..end], if end < text.len() { "…" } else { "" })
+}
+
+/// How alike two words are, 0 to 1.
+pub(crate) fn likeness(a: &str, b: &str) -> f64 {
+    if a.len() > LONGEST { 0.0 } else { strsim::jaro_winkler(a, b) }
 }
 
 /// The candidate most like `word`, if any is like it at all; case does not count.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
-    let likeness = |c: &str| strsim::jaro_winkler(&word, &c.to_lowercase());
     candidates
         .into_iter()
-        .map(|c| (likeness(c), c))
+        .map(|c| (likeness(&word, &c.to_lowercase()), c))
         .filter(|(score, _)| *score > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, c)| c)

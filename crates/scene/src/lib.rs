@@ -4,12 +4,27 @@
 //! and line of meaning stand once, in `scene.rs`. [`Scene::resolve`] refuses nonsense and makes what is
 //! relative absolute: [`Resolved`], with the camera as a [`CameraView`] that gives rays.
 //!
+//! ```
+//! use motes_scene::{Bounds, Scene};
+//!
+//! let mut scene = Scene::from_toml("[camera]\nfov = 40.0")?;
+//! scene.set("image.width", "640")?;
+//! let visible = Bounds::new([0.0; 3].into(), [1.0; 3].into());
+//! let rays = scene.resolve(Some(visible))?.view.rays(visible.center());
+//! let (origin, direction) = rays.ray(320.5, 240.5);
+//! assert!(origin.dot(direction) < 0.0); // towards what is visible
+//! # Ok::<(), motes_scene::SceneError>(())
+//! ```
+//!
 //! Invariants: plain data and pure functions; no file, clock or environment is read, and no other crate
 //! of Motes is known here.
 
 mod bounds;
 mod camera;
 mod color;
+mod color_points;
+mod colormap;
+mod elements;
 mod error;
 mod resolve;
 mod scene;
@@ -20,6 +35,8 @@ mod text;
 pub use bounds::Bounds;
 pub use camera::{CameraView, Projected, Rays};
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
+pub use colormap::ColorMap;
+pub use elements::Element;
 pub use error::{Result, SceneError, nearest};
 pub use resolve::{Background, KeyLight, Lights, Resolved};
 pub use scene::{

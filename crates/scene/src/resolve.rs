@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::bounds::Bounds;
 use crate::camera::CameraView;
+use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
 
@@ -155,6 +156,7 @@ fn check_system(system: &System, index: usize) -> Result<()> {
         let numbers = ![f.min, f.max].iter().flatten().any(|v| v.is_nan());
         need(&at("min"), (f.min, f.max), numbers, "numbers for min and max")?;
     }
+    ColorMap::by_name(&system.color.map)?;
     if let Some([a, b]) = system.color.range {
         let fits = a.is_finite() && b.is_finite();
         need(&at("color.range"), [a, b], fits, "two finite numbers")?;
@@ -255,7 +257,7 @@ mod tests {
             (&["system.radius_scale=inf"], "system.0.radius_scale"),
             (&["system.radii.Na=-1"], "system.0.radii.Na"),
             (&["system.color.range=0,1", "system.color.log=true"], "system.0.color.range"),
-            (&["system.filter=[{min=1}]"], "system.0.filter.0.property"),
+            (&["system.filter=[{property=''}]"], "system.0.filter.0.property"),
             (&["overlay.text_size=0"], "overlay.text_size"),
         ] {
             let mut scene = Scene::default();
@@ -266,6 +268,14 @@ mod tests {
             let named = matches!(&error, SceneError::Value { path: p, .. } if p == path);
             assert!(named, "{assignments:?}: {error}");
         }
+    }
+
+    #[test]
+    fn an_unknown_color_map_is_refused() {
+        let mut scene = Scene::default();
+        scene.set("system.color.map", "mgama").unwrap();
+        let error = scene.check().unwrap_err().to_string();
+        assert_eq!(error, "no colour map `mgama`; did you mean `magma`?");
     }
 
     #[test]

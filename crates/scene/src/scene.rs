@@ -46,7 +46,7 @@ settings! {
         /// Shown particles as an expression over properties; empty: all.
         r#where: String = String::new(),
         /// Shown particles by property: what every filter lets through.
-        filter: Vec<Filter> = Vec::new() => "[{ property = \"Velocity\", component = \"magnitude\", min = 0.5, max = 2.0 }]",
+        filter: Vec<Filter> = Vec::new(),
         /// How the particles are coloured.
         color: Coloring = Coloring::default(),
     }
@@ -56,7 +56,7 @@ settings! {
     /// A filter: lets through particles whose property lies in min to max, both included.
     pub struct Filter {
         /// Name of the property.
-        property: String = String::new(),
+        property: String = "Position".into(),
         /// Which component of a vector property.
         component: Component = Component::Magnitude,
         /// Least value let through, in the property's unit; none: no limit.
@@ -73,7 +73,7 @@ settings! {
         by: ColorBy = ColorBy::Auto,
         /// Which component of a vector property.
         component: Component = Component::Magnitude,
-        /// Colour map of a property's values, such as viridis, cividis, magma, turbo, batlow, vik, coolwarm, gray.
+        /// Colour map of a property's values, such as viridis, cividis, magma, turbo, batlow, vik, coolwarm, gray; with _r, backwards.
         map: String = "viridis".into(),
         /// Values at the two ends of the map, in the property's unit; none: the least and greatest.
         range: Option<[f64; 2]> = None => "[0.0, 1.0]",
@@ -243,7 +243,7 @@ words! {
 }
 
 words! {
-    /// A set of distinct colours, see `motes_scene::palette`.
+    /// A set of distinct colours, see [`Palette::color`].
     pub enum Palette {
         /// Tableau 10.
         Tableau = "tableau",

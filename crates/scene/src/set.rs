@@ -2,7 +2,7 @@
 
 use toml::{Table, Value};
 
-use crate::error::{Result, SceneError};
+use crate::error::{Result, SceneError, likeness, quoted};
 use crate::scene::Scene;
 use crate::settings::{Setting, Shape};
 use crate::text::join;
@@ -31,7 +31,7 @@ impl Scene {
         let names: Vec<&str> = path.split('.').collect();
         let shape = Self::shape();
         let leaf = find(&shape, &names).ok_or_else(|| unknown_path(&shape, path))?;
-        let wrong = || SceneError::value(path, leaf.expected(), format!("`{value}`"));
+        let wrong = || SceneError::value(path, leaf.expected(), format!("`{}`", quoted(value)));
         let tree = Value::Table(Table::try_from(&*self).map_err(|_| wrong())?);
         for reading in readings(value) {
             let mut tree = tree.clone();
@@ -65,8 +65,8 @@ fn find<'a>(shape: &'a Shape, names: &[&str]) -> Option<&'a Shape> {
     match shape {
         Shape::Value(_) => None,
         Shape::Map(of) => find(of, rest),
-        Shape::List(of) if name.parse::<usize>().is_ok() => find(of, rest),
-        Shape::List(of) => find(of, names),
+        Shape::List(of, _) if name.parse::<usize>().is_ok() => find(of, rest),
+        Shape::List(of, _) => find(of, names),
         Shape::Table(fields) => find(&fields.iter().find(|f| f.name == *name)?.shape, rest),
     }
 }
@@ -87,7 +87,7 @@ fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: &Value) -> 
     let path = join(target.path, name);
     let next = Target { names: rest, path: &path };
     match (shape, value) {
-        (Shape::List(of), Value::Array(items)) => match name.parse::<usize>() {
+        (Shape::List(of, _), Value::Array(items)) => match name.parse::<usize>() {
             Ok(index) => {
                 let count = items.len();
                 let item = items.get_mut(index).ok_or_else(|| {
@@ -122,16 +122,16 @@ fn unknown_path(shape: &Shape, path: &str) -> SceneError {
     let (whole, last) = (typed.join("."), typed.last().copied().unwrap_or_default());
     let score = |known: &str| {
         let known_last = known.rsplit('.').next().unwrap_or(known);
-        let by_last = strsim::jaro_winkler(last, known_last);
+        let by_last = likeness(last, known_last);
         // The whole path breaks ties between parameters of one name.
-        by_last.max(strsim::jaro_winkler(&whole, known)) + 0.01 * strsim::jaro(&whole, known)
+        by_last.max(likeness(&whole, known)) + 0.01 * likeness(&whole, known)
     };
     let nearest = known.iter().map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
     let hint = match nearest {
         Some((score, known)) if score > 0.75 => format!("; did you mean `{known}`?"),
         _ => "; `motes scene` prints them all".into(),
     };
-    SceneError::UnknownPath { path: path.into(), hint }
+    SceneError::UnknownPath { path: quoted(path), hint }
 }
 
 /// Every parameter's path, without indices.
@@ -140,7 +140,7 @@ fn paths(shape: &Shape, path: &str, out: &mut Vec<String>) {
         Shape::Table(fields) => {
             fields.iter().for_each(|f| paths(&f.shape, &join(path, f.name), out));
         }
-        Shape::List(of) => paths(of, path, out),
+        Shape::List(of, _) => paths(of, path, out),
         Shape::Value(_) | Shape::Map(_) => out.push(path.into()),
     }
 }

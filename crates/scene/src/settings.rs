@@ -11,8 +11,8 @@ pub enum Shape {
     Value(String),
     /// A table of named parameters.
     Table(Vec<Field>),
-    /// A list of tables.
-    List(Box<Shape>),
+    /// A list of tables, and one with its defaults.
+    List(Box<Shape>, toml::Table),
     /// Values under free names.
     Map(Box<Shape>),
 }
@@ -45,7 +45,7 @@ impl Shape {
                 let names: Vec<_> = fields.iter().map(|f| f.name).collect();
                 format!("a table of {}", names.join(", "))
             }
-            Self::List(_) => "a list of tables".into(),
+            Self::List(..) => "a list of tables".into(),
             Self::Map(of) => format!("a table of names, each with {}", of.expected()),
         }
     }
@@ -78,9 +78,10 @@ impl<T: Setting> Setting for Option<T> {
     }
 }
 
-impl<T: Setting> Setting for Vec<T> {
+impl<T: Setting + Default + serde::Serialize> Setting for Vec<T> {
     fn shape() -> Shape {
-        Shape::List(Box::new(T::shape()))
+        let defaults = toml::Table::try_from(T::default()).unwrap_or_default();
+        Shape::List(Box::new(T::shape()), defaults)
     }
 }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use crate::error::{Result, SceneError, hint};
+use crate::error::{Result, SceneError, hint, quoted};
 use crate::scene::Scene;
 use crate::settings::{Field, Setting, Shape};
 
@@ -83,12 +83,12 @@ impl Unknown {
                         let place =
                             if path.is_empty() { String::new() } else { format!(" in {path}") };
                         let hint = hint(name, fields.iter().map(|f| f.name));
-                        let reason = format!("no parameter `{name}`{place}{hint}");
+                        let reason = format!("no parameter `{}`{place}{hint}", quoted(name));
                         return Some(Self { span: key.span(), reason });
                     }
                 },
                 Shape::Map(of) => of,
-                Shape::Value(_) | Shape::List(_) => continue,
+                Shape::Value(_) | Shape::List(..) => continue,
             };
             let found = Self::find_in_value(value, inner, &join(path, name), values);
             if found.is_some() {
@@ -107,7 +107,7 @@ impl Unknown {
         values.push(ValueAt { span: value.span(), path: path.into(), shape: shape.clone() });
         match (value.get_ref(), shape) {
             (DeValue::Table(table), _) => Self::find(table, shape, path, values),
-            (DeValue::Array(items), Shape::List(of)) => items
+            (DeValue::Array(items), Shape::List(of, _)) => items
                 .iter()
                 .enumerate()
                 .find_map(|(i, v)| Self::find_in_value(v, of, &join(path, &i.to_string()), values)),
@@ -125,7 +125,7 @@ fn type_error(text: &str, error: &toml::de::Error, values: &[ValueAt]) -> SceneE
             "{}: expected {}, found {} ({})",
             v.path,
             v.shape.expected(),
-            text.get(v.span.clone()).unwrap_or("something else"),
+            quoted(text.get(v.span.clone()).unwrap_or("something else")),
             error.message().replace('\n', "; ")
         ),
         None => error.message().replace('\n', "; "),
@@ -144,45 +144,46 @@ pub(crate) fn join(path: &str, name: &str) -> String {
 
 /// Writes the values of a table, then the tables in it: TOML wants them last.
 fn document(out: &mut String, fields: &[Field], table: &Table, path: &str) {
-    let is_section = |f: &Field| {
-        matches!(f.shape, Shape::Table(_))
-            || matches!(f.shape, Shape::List(_)) && f.example.is_none()
-    };
+    let is_section = |f: &&Field| matches!(f.shape, Shape::Table(_) | Shape::List(..));
     for field in fields.iter().filter(|f| !is_section(f)) {
-        let value = table.get(field.name).filter(|v| !is_empty(v) || field.example.is_none());
-        let _ = match (value, field.example) {
-            (Some(value), _) => write!(out, "# {}\n{} = {value}\n", field.meaning, field.name),
-            (None, Some(example)) => {
-                write!(out, "# {}\n# {} = {example}\n", field.meaning, field.name)
-            }
-            (None, None) => Ok(()),
+        let value = table.get(field.name).filter(|v| v.as_table().is_none_or(|t| !t.is_empty()));
+        let value = match (value, field.example) {
+            (Some(value), _) => format!("{} = {value}", field.name),
+            (None, Some(example)) => format!("# {} = {example}", field.name),
+            (None, None) => continue,
         };
+        let _ = writeln!(out, "# {}\n{value}", field.meaning);
     }
-    for field in fields.iter().filter(|f| is_section(f)) {
+    for field in fields.iter().filter(is_section) {
         let path = join(path, field.name);
-        let section = |out: &mut String, header: &str, shape: &Shape, value: &Value| {
-            let _ = write!(out, "\n# {}\n{header}\n", field.meaning);
-            if let (Shape::Table(fields), Value::Table(table)) = (shape, value) {
-                document(out, fields, table, &path);
-            }
-        };
         match (&field.shape, table.get(field.name)) {
-            (Shape::List(of), Some(Value::Array(items))) => {
-                for item in items {
-                    section(out, &format!("[[{path}]]"), of, item);
+            (Shape::List(of, defaults), Some(Value::Array(items))) if items.is_empty() => {
+                let mut section = String::new();
+                document_section(&mut section, field, (of, defaults), &path);
+                section.lines().for_each(|line| {
+                    let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "# " });
+                });
+            }
+            (Shape::List(of, _), Some(Value::Array(items))) => {
+                for item in items.iter().filter_map(Value::as_table) {
+                    document_section(out, field, (of, item), &path);
                 }
             }
-            (shape, Some(value)) => section(out, &format!("[{path}]"), shape, value),
-            (_, None) => {}
+            (shape, Some(Value::Table(inner))) => {
+                document_section(out, field, (shape, inner), &path);
+            }
+            _ => {}
         }
     }
 }
 
-fn is_empty(value: &Value) -> bool {
-    match value {
-        Value::Table(t) => t.is_empty(),
-        Value::Array(a) => a.is_empty(),
-        _ => false,
+/// A table, or one of a list, under its header.
+fn document_section(out: &mut String, field: &Field, of: (&Shape, &Table), path: &str) {
+    let (open, close) =
+        if matches!(field.shape, Shape::List(..)) { ("[[", "]]") } else { ("[", "]") };
+    let _ = writeln!(out, "\n# {}\n{open}{path}{close}", field.meaning);
+    if let (Shape::Table(fields), table) = of {
+        document(out, fields, table, path);
     }
 }
 
@@ -218,7 +219,7 @@ mod tests {
                         visit(&f.shape, &path);
                     }
                 }
-                Shape::List(of) => visit(of, path),
+                Shape::List(of, _) => visit(of, path),
                 Shape::Map(_) | Shape::Value(_) => {}
             }
         }
@@ -282,5 +283,22 @@ mod tests {
         scene.system.clear();
         scene.set_sources(&["c".into()]);
         assert_eq!(scene.system, [crate::System { source: "c".into(), ..Default::default() }]);
+    }
+
+    #[test]
+    fn no_text_panics() {
+        let text = Scene::documented_toml();
+        for (at, _) in text.char_indices().step_by(7) {
+            // Whatever is left is a scene or an error that names a line of it.
+            if let Err(SceneError::Text { line, .. }) = Scene::from_toml(&text[..at]) {
+                assert!(line <= 1 + text[..at].matches('\n').count());
+            }
+        }
+        let deep = "[".repeat(100_000);
+        for bad in [format!("system = {deep}"), deep, "image.".repeat(100_000), "\u{0}".into()] {
+            assert!(Scene::from_toml(&bad).is_err());
+            assert!(Scene::default().set("image", &bad).is_err());
+            assert!(Scene::default().set(&bad, "1").is_err());
+        }
     }
 }
