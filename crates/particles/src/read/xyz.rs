@@ -174,7 +174,8 @@ fn take_value(text: &str) -> (String, &str) {
         Some(b'[') => return take_brackets(text),
         _ => {
             let end = text.find(char::is_whitespace).unwrap_or(text.len());
-            return (text[..end].to_owned(), &text[end..]);
+            // `time = 0.5, E = …`
+            return (text[..end].trim_end_matches(',').to_owned(), &text[end..]);
         }
     };
     let inner = &text[1..];
