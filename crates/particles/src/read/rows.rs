@@ -77,6 +77,18 @@ impl Schema {
         }
     }
 
+    /// Settles guesses by the first row: what is no number there is a word everywhere.
+    pub(super) fn settle(&mut self, first_row: &str) {
+        for (token, field) in text::fields(first_row.as_bytes(), self.separator).zip(&self.fields) {
+            if let Some(group) = field.and_then(|(group, _)| self.groups.get_mut(group))
+                && group.kind == Kind::Guess
+                && text::real(token).is_none()
+            {
+                group.kind = Kind::Name;
+            }
+        }
+    }
+
     /// How many fields a line must have.
     pub(super) fn needed_fields(&self) -> usize {
         self.fields.len()
