@@ -334,9 +334,15 @@ fn compressed_members_are_one_content() {
 fn cut_or_damaged_compressed_files_end_in_an_error_or_a_warning() {
     for name in ["trajectory_two_members.xyz.gz", "trajectory_skippable.xyz.zst"] {
         let bytes = std::fs::read(own_data().join(name)).unwrap();
+        let mut whole = 0;
         for cut in 1..bytes.len() {
-            common::read_damaged(&scratch("cut_compressed"), name, &bytes[..cut]);
+            let Ok((_, mut reader)) = reading::open(&file(name, &bytes[..cut])) else { continue };
+            let Ok(frames) = reader.count(&|_, _| {}) else { continue };
+            assert!(frames == 2 || !reader.warnings().is_empty(), "{name} cut at {cut}");
+            whole += usize::from(frames == 2);
         }
+        // Only what says nothing of the particles may be lost unseen: checksums, a skippable frame.
+        assert!(whole < 40, "{name} was whole {whole} times");
         common::damage(&bytes, 400, |bytes| {
             common::read_damaged(&scratch("cut_compressed"), name, bytes)
         });
@@ -371,7 +377,7 @@ fn damaged_text_never_panics() {
         let bytes = std::fs::read(own_data().join(name)).unwrap();
         common::damage(&bytes, 300, |bytes| common::read_damaged(&folder, name, bytes));
     }
-    let table = "\"id\",\"x\",\"y\",\"z\",\"Vel:0\",\"Vel:1\",\"Vel:2\",name\n1,2,3,4,5,6,7,\"a b\"\n2,3,4,5,,,,c\n".repeat(1);
+    let table = "\"id\",\"x\",\"y\",\"z\",\"Vel:0\",\"Vel:1\",\"Vel:2\",name\n1,2,3,4,5,6,7,\"a b\"\n2,3,4,5,,,,c\n";
     common::damage(table.as_bytes(), 300, |bytes| {
         common::read_damaged(&folder, "damaged.csv", bytes)
     });

@@ -11,9 +11,9 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod dump;
 mod fields;
 mod forward;
-mod dump;
 mod input;
 mod lanes;
 mod lines;

@@ -2,6 +2,7 @@
 //!
 //! The files are no part of the repository; without them the tests that need them do nothing.
 #![allow(dead_code)] // each test uses its part
+#![allow(clippy::print_stderr)] // a test that does nothing says so
 
 use std::path::{Path, PathBuf};
 

@@ -79,7 +79,7 @@ impl Layout {
             return Self::empty(separator, body, names);
         };
         let fields = first.len();
-        if fields < 2 || fields > MOST_COLUMNS || numbers(first) < 2 {
+        if !(2..=MOST_COLUMNS).contains(&fields) || numbers(first) < 2 {
             return Err(refuse(body, headers, "a row with two coordinates at least"));
         }
         for (i, (_, row)) in rows.iter().enumerate() {
