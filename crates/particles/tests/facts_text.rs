@@ -22,3 +22,11 @@ fn xyz_files_agree_with_the_facts() {
     let checked = common::check_facts(of_interest);
     assert!(checked == 0 || checked >= 9, "{checked} files");
 }
+
+#[test]
+fn tables_agree_with_the_facts() {
+    let checked = common::check_facts(|file| {
+        file.ends_with(".csv") || file.ends_with(".tab") || file.ends_with(".txt")
+    });
+    assert!(checked == 0 || checked >= 7, "{checked} files");
+}

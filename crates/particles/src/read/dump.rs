@@ -262,6 +262,7 @@ fn columns(names: &str, first_row: Option<&str>) -> Columns {
                 Some(add_column(&mut resolved.schema.groups, &words, word, is_number));
         }
     }
+    resolved.schema.settle(first_row.unwrap_or_default());
     resolved
 }
 

@@ -202,7 +202,13 @@ impl Read for ZstdMembers {
                 self.decoder.decode_blocks(&mut self.file, one).map_err(Error::other)?;
             }
             match self.decoder.read(out)? {
-                0 if self.decoder.is_finished() => self.inside = false,
+                0 if self.decoder.is_finished() => {
+                    self.inside = false;
+                    let stored = self.decoder.get_checksum_from_data();
+                    if stored.is_some() && stored != self.decoder.get_calculated_checksum() {
+                        return Err(Error::other("the checksum does not agree"));
+                    }
+                }
                 n => return Ok(n),
             }
         }

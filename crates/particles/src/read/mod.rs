@@ -11,9 +11,9 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod dump;
 mod fields;
 mod forward;
-mod dump;
 mod input;
 mod lanes;
 mod lines;
@@ -21,6 +21,7 @@ pub mod names;
 mod numpy;
 mod ply;
 mod rows;
+mod table;
 mod text;
 mod trajectory;
 mod xyz;
@@ -98,7 +99,8 @@ pub trait Reader: Send {
     }
 }
 
-/// All formats, in the order they are asked; a tie goes to the earlier.
+/// All formats, in the order they are asked; a tie goes to the earlier. Tables, which any text may look
+/// like, come last.
 #[rustfmt::skip] // one a line
 pub static FORMATS: &[&dyn Format] = &[
     &dump::LammpsDump,
@@ -106,6 +108,7 @@ pub static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &numpy::Npy,
     &numpy::Npz,
+    &table::Table,
 ];
 
 /// Opens a file with the format that recognises it best; gives the format's name and the reader.

@@ -77,6 +77,18 @@ impl Schema {
         }
     }
 
+    /// Settles guesses by the first row: what is no number there is a word everywhere.
+    pub(super) fn settle(&mut self, first_row: &str) {
+        for (token, field) in text::fields(first_row.as_bytes(), self.separator).zip(&self.fields) {
+            if let Some(group) = field.and_then(|(group, _)| self.groups.get_mut(group))
+                && group.kind == Kind::Guess
+                && text::real(token).is_none()
+            {
+                group.kind = Kind::Name;
+            }
+        }
+    }
+
     /// How many fields a line must have.
     pub(super) fn needed_fields(&self) -> usize {
         self.fields.len()
@@ -264,7 +276,6 @@ pub(super) fn is_comment(line: &[u8]) -> bool {
 
 /// Rows of one chunk or of the whole frame.
 struct Part {
-    rows: u64,
     cells: Vec<Cells>,
     /// Groups of kind `Guess` that hold something else than numbers.
     words: Vec<bool>,
@@ -273,7 +284,7 @@ struct Part {
 impl Part {
     fn new(schema: &Schema) -> Self {
         let cells = schema.groups.iter().map(|g| Cells::new(g.kind)).collect();
-        Self { rows: 0, cells, words: vec![false; schema.groups.len()] }
+        Self { cells, words: vec![false; schema.groups.len()] }
     }
 }
 
@@ -287,7 +298,6 @@ fn parse_chunk(chunk: &[u8], schema: &Schema, used: &[bool]) -> std::result::Res
         if !(schema.loose && is_comment(line)) {
             parse_row(line, schema, used, &mut part)
                 .map_err(|message| Wrong { at: start, message })?;
-            part.rows += 1;
         }
         start = end + 1;
     }
@@ -378,8 +388,6 @@ impl From<Stop> for ReadError {
 
 /// What [`read_rows`] gives.
 pub(super) struct RowData {
-    /// How many rows there were.
-    pub(super) rows: u64,
     /// Groups of kind `Guess` that hold words: change their kind and read again.
     pub(super) words: Vec<usize>,
     positions: PositionBuilder,
@@ -430,7 +438,6 @@ pub(super) fn read_rows(
                 let points: Vec<_> = points.iter().map(|p| place(*p)).collect();
                 positions.push(&points);
             }
-            whole.rows += part.rows;
             whole.words.iter_mut().zip(&part.words).for_each(|(all, one)| *all |= one);
             whole.cells.iter_mut().zip(part.cells).for_each(|(all, one)| all.append(one));
         }
@@ -443,7 +450,7 @@ pub(super) fn read_rows(
     let words = (0..whole.words.len()).filter(|i| whole.words[*i]).collect();
     let cells = schema.groups.iter().cloned().zip(whole.cells).zip(used);
     let cells = cells.filter(|(_, used)| *used).map(|(both, _)| both).collect();
-    Ok(RowData { rows: whole.rows, words, positions, cells })
+    Ok(RowData { words, positions, cells })
 }
 
 /// A broken row.

@@ -444,7 +444,7 @@ pub(super) fn real(token: &[u8]) -> Option<f64> {
     if let Ok(value) = fast_float2::parse(token) {
         return Some(value);
     }
-    if token.len() > 64 {
+    if token.len() > 64 || !token.iter().any(|b| matches!(b, b'd' | b'D')) {
         return None;
     }
     let token: Vec<u8> =

@@ -103,14 +103,14 @@ impl Layout for Frame {
             _ => return Err(Stop::Cut(lines.cut("a line of comment and the particles"))),
         };
         let pairs = parse_comment(&comment.text);
-        let fail = |message: String| Stop::Error(lines.error(comment.number, message));
-        let (schema, diameter) = match find(&pairs, &["properties"]) {
-            Some(properties) => declared_schema(properties).map_err(fail)?,
-            None => {
-                let row = if count > 0 { lines.peek()? } else { None };
-                (plain_schema(row.as_ref().map_or("", |l| &l.text)), false)
-            }
+        let row = if count > 0 { lines.peek()? } else { None };
+        let row = row.as_ref().map_or("", |line| &line.text);
+        let (mut schema, diameter) = match find(&pairs, &["properties"]) {
+            Some(properties) => declared_schema(properties)
+                .map_err(|message| lines.error(comment.number, message))?,
+            None => (plain_schema(row), false),
         };
+        schema.settle(row);
         let number =
             |keys: &[&str]| find(&pairs, keys).and_then(|v| text::real(v.trim().as_bytes()));
         let step = find(&pairs, &["timestep", "step", "frame_step"])
@@ -174,7 +174,8 @@ fn take_value(text: &str) -> (String, &str) {
         Some(b'[') => return take_brackets(text),
         _ => {
             let end = text.find(char::is_whitespace).unwrap_or(text.len());
-            return (text[..end].to_owned(), &text[end..]);
+            // `time = 0.5, E = …`
+            return (text[..end].trim_end_matches(',').to_owned(), &text[end..]);
         }
     };
     let inner = &text[1..];
