@@ -14,6 +14,7 @@ mod build;
 mod classes;
 mod grid;
 mod lattice;
+mod neighbors;
 mod ranges;
 mod visibility;
 

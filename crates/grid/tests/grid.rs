@@ -208,3 +208,26 @@ fn coinciding_spheres_are_seen_once_the_lowest_index_first() {
     assert_eq!(seen(&grid, &odd), [1]);
     assert_eq!(odd.visible(), 50_000);
 }
+
+#[test]
+fn nearest_distances_are_those_of_brute_force() {
+    let mut positions = cloud(2000, 16);
+    // A dense cluster, coinciding particles and an outlier.
+    positions.extend(cloud(500, 17).into_iter().map(|p| p.map(|v| 0.3 + 0.01 * v)));
+    positions.extend([[0.9; 3]; 10]);
+    positions.push([40.0, -7.0, 3.0]);
+    let grid = build(&positions);
+    for slot in 0..grid.len() {
+        let own = grid.center(slot);
+        let truth = (0..grid.len())
+            .map(|other| grid.center(other).distance(own))
+            .filter(|d| *d > 0.0)
+            .fold(f32::INFINITY, f32::min);
+        assert_eq!(grid.nearest_distance(slot), Some(truth));
+    }
+    assert_eq!(build(&[[1.0; 3]; 50]).median_spacing(), None);
+    assert_eq!(build(&[]).median_spacing(), None);
+    let lattice: Vec<[f32; 3]> =
+        (0..1000).map(|i| [(i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32]).collect();
+    assert_eq!(build(&lattice).median_spacing(), Some(1.0));
+}
