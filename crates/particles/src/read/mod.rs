@@ -14,8 +14,10 @@
 mod dump;
 mod fields;
 mod forward;
+mod houdini;
 mod input;
 mod lanes;
+mod legacy_vtk;
 mod lines;
 pub mod names;
 mod numpy;
@@ -108,6 +110,8 @@ pub static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &numpy::Npy,
     &numpy::Npz,
+    &legacy_vtk::LegacyVtk,
+    &houdini::Houdini,
     &table::Table,
 ];
 

@@ -3,6 +3,8 @@
 //! One spelling per property, as OVITO and the simulation codes' users know them; a format maps its
 //! own spellings to these and keeps what it does not know.
 
+use crate::{Column, Values};
+
 /// Particle positions; never a column, but the name users write in expressions.
 pub const POSITION: &str = "Position";
 /// Sphere radii; stored apart from the columns.
@@ -131,4 +133,56 @@ pub fn component(name: &str) -> Option<(&'static str, usize, usize)> {
     COMPONENTS.iter().find_map(|(standard, all)| {
         all.iter().position(|n| *n == name).map(|i| (*standard, i, all.len()))
     })
+}
+
+/// As [`standard`], but only where the property has so many components: a speed is no velocity.
+pub fn standard_of(name: &str, components: usize) -> Option<&'static str> {
+    let standard = standard(name).filter(|standard| *standard != POSITION)?;
+    let expected = match standard {
+        RADIUS | PARTICLE_TYPE | PARTICLE_IDENTIFIER | MOLECULE_IDENTIFIER => 1,
+        MASS | CHARGE | TRANSPARENCY => 1,
+        ORIENTATION => 4,
+        _ => 3,
+    };
+    (components == expected).then_some(standard)
+}
+
+/// Joins columns `vx`, `vy`, `vz` and the like into one, where all are there and of one type.
+pub fn joined(mut columns: Vec<Column>) -> Vec<Column> {
+    for (standard, spellings) in COMPONENTS {
+        let place = |spelling: &&str| {
+            let fits = |c: &Column| c.components == 1 && c.name.eq_ignore_ascii_case(spelling);
+            columns.iter().position(fits)
+        };
+        let Some(places) = spellings.iter().map(place).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
+        let parts: Vec<&Values> = places.iter().map(|at| &columns[*at].values).collect();
+        let Some(values) = interleaved(&parts) else { continue };
+        if columns.iter().any(|column| column.name == *standard) {
+            continue;
+        }
+        let first = places.iter().copied().min().unwrap_or(0);
+        columns[first] = Column::new(*standard, spellings.len(), values);
+        let mut at = 0..;
+        columns.retain(|_| at.next().is_none_or(|at| at == first || !places.contains(&at)));
+    }
+    columns
+}
+
+fn interleaved(parts: &[&Values]) -> Option<Values> {
+    fn rows<T: Copy>(parts: &[&Vec<T>]) -> Vec<T> {
+        let rows = parts.iter().map(|part| part.len()).min().unwrap_or(0);
+        (0..rows).flat_map(|row| parts.iter().map(move |part| part[row])).collect()
+    }
+    macro_rules! of {
+        ($kind:ident) => {
+            parts
+                .iter()
+                .map(|part| if let Values::$kind(v) = part { Some(v) } else { None })
+                .collect::<Option<Vec<_>>>()
+                .map(|parts| Values::$kind(rows(&parts)))
+        };
+    }
+    of!(F32).or_else(|| of!(F64)).or_else(|| of!(I32)).or_else(|| of!(I64)).or_else(|| of!(U8))
 }
