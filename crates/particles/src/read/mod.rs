@@ -11,14 +11,15 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod dump;
+mod elements;
 mod fields;
 mod forward;
-mod dump;
 mod input;
 mod lanes;
-mod lines;
 pub mod names;
 mod numpy;
+mod pdb;
 mod ply;
 mod rows;
 mod text;
@@ -103,6 +104,7 @@ pub trait Reader: Send {
 pub static FORMATS: &[&dyn Format] = &[
     &dump::LammpsDump,
     &xyz::Xyz,
+    &pdb::Pdb,
     &ply::Ply,
     &numpy::Npy,
     &numpy::Npz,
