@@ -3,7 +3,7 @@
 //! Formats whose files name their fields themselves (PLY vertices, NumPy records and archives) say
 //! what there is as [`Slot`]s; a [`Table`] takes the rows and gives [`Particles`].
 
-use super::lanes::{Lane, Scalar, append, append_positions};
+use super::lanes::{Lane, Scalar, append, append_positions, append_scaled};
 use super::{Wanted, names};
 use crate::{Column, Particles, PositionBuilder, Radius, Values};
 
@@ -48,41 +48,6 @@ pub(crate) struct Plan {
 pub(crate) const POSITION_VECTORS: &[&str] =
     &["position", "positions", "pos", "coordinates", "coords", "coord", "xyz", "points", "x", "r"];
 
-type Vector = (&'static str, &'static [&'static str], &'static [[&'static str; 3]]);
-
-/// Vectors by name: the field's name for all of it, or its components' names.
-const VECTORS: &[Vector] = &[
-    (names::VELOCITY, &["velocity", "velocities", "vel", "v"], &[["vx", "vy", "vz"]]),
-    (
-        names::NORMAL,
-        &["normal", "normals"],
-        &[["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]],
-    ),
-    (names::FORCE, &["force", "forces"], &[["fx", "fy", "fz"]]),
-    (names::ACCELERATION, &["acceleration", "acc"], &[["ax", "ay", "az"]]),
-    (names::ANGULAR_VELOCITY, &["omega", "angular_velocity"], &[["omegax", "omegay", "omegaz"]]),
-    (names::PERIODIC_IMAGE, &["image", "images"], &[["ix", "iy", "iz"]]),
-    (
-        names::COLOR,
-        &["color", "colors", "rgb", "rgba"],
-        &[
-            ["red", "green", "blue"],
-            ["diffuse_red", "diffuse_green", "diffuse_blue"],
-            ["r", "g", "b"],
-        ],
-    ),
-];
-
-/// Single numbers by name.
-const SCALARS: &[(&str, &[&str])] = &[
-    (names::PARTICLE_TYPE, &["type", "types", "ptype", "species", "particle_type", "atom_type"]),
-    (names::PARTICLE_IDENTIFIER, &["id", "ids", "particle_id", "particleid", "particle_ids"]),
-    (names::MOLECULE_IDENTIFIER, &["mol", "molecule", "molecule_id"]),
-    (names::MASS, &["mass", "masses"]),
-    (names::CHARGE, &["charge", "charges", "q"]),
-    (names::TRANSPARENCY, &["transparency"]),
-];
-
 /// Radii by name, with the factor that makes them radii.
 const RADII: &[(&str, f64)] =
     &[("radius", 1.0), ("radii", 1.0), ("rad", 1.0), ("r", 1.0), ("diameter", 0.5)];
@@ -123,7 +88,7 @@ impl Open<'_> {
     }
 }
 
-/// How an integer colour becomes 0–1: none for bytes, which stay, and floats.
+/// The factor that takes a colour or an opacity to 0–1.
 fn full_scale(scalar: Scalar) -> f64 {
     match scalar {
         Scalar::U16 => 1.0 / 65535.0,
@@ -143,27 +108,20 @@ impl Plan {
         open.take(&found);
         let position = std::array::from_fn(|i| found.get(i).copied());
         let scalar_of = |i: usize| slots[found.get(i).copied().unwrap_or(found[0])].scalar;
+        // Beside `g` and `b`, `r` is red.
+        let is_red = open.scalar("g").is_some() && open.scalar("b").is_some();
+        let radius = RADII
+            .iter()
+            .filter(|(name, _)| *name != "r" || !is_red)
+            .find_map(|(name, factor)| Some((open.scalar(name)?, *factor)));
+        open.taken.iter_mut().enumerate().for_each(|(i, taken)| {
+            *taken |= radius.is_some_and(|(slot, _)| slot == i);
+        });
         let mut columns = Vec::new();
-        for (name, whole, parts) in VECTORS {
-            let mut parts = parts.iter().filter_map(|p| open.triple(p)).filter(|found| {
-                // Two letters of a colour are no colour.
-                *name != names::COLOR || found.len() == 3
-            });
-            let found = parts.next().or_else(|| whole.iter().find_map(|n| open.vector(n)));
-            if let Some(found) = found {
-                open.take(&found);
-                plan_vector(&mut columns, &mut open, name, found);
-            }
+        for group in groups(&open) {
+            group.plan(&open, &mut columns);
         }
-        let radius = RADII.iter().find_map(|(name, factor)| Some((open.scalar(name)?, *factor)));
-        open.take(&radius.map(|(slot, _)| slot).into_iter().collect::<Vec<_>>());
-        for (name, spellings) in SCALARS {
-            if let Some(slot) = spellings.iter().find_map(|s| open.scalar(s)) {
-                open.take(&[slot]);
-                columns.push(Planned::keep(*name, vec![slot]));
-            }
-        }
-        plan_others(&mut columns, &open);
+        plan_colours(&mut columns, slots);
         // The order of the file, whatever the order of discovery.
         columns.sort_by_key(|c| c.slots.first().copied());
         columns.retain(|c| wanted.wants(&c.name));
@@ -192,58 +150,96 @@ impl Planned {
     }
 }
 
-fn plan_vector(columns: &mut Vec<Planned>, open: &mut Open<'_>, name: &str, mut slots: Vec<usize>) {
-    if name != names::COLOR {
-        return columns.push(Planned::keep(name, slots));
-    }
-    let scalar = open.slots[slots[0]].scalar;
-    // `alpha` is opacity only beside a colour: elsewhere it is a viscosity or an angle.
-    let alpha = match slots.len() {
-        4 => slots.pop(),
-        _ => ["alpha", "diffuse_alpha", "a"].iter().find_map(|n| open.scalar(n)),
-    };
-    let conversion = match scalar {
-        Scalar::U8 => Conversion::Keep,
-        s if s.is_float() => Conversion::Keep,
-        s => Conversion::Scale(full_scale(s)),
-    };
-    columns.push(Planned { name: name.into(), slots, conversion });
-    if let Some(alpha) = alpha {
-        open.take(&[alpha]);
-        let conversion = Conversion::Opacity(full_scale(open.slots[alpha].scalar));
-        columns.push(Planned { name: names::TRANSPARENCY.into(), slots: vec![alpha], conversion });
-    }
-}
-
 /// `Vel` and 1 for `Vel:1`.
 fn numbered(name: &str) -> Option<(&str, usize)> {
     let (base, component) = name.rsplit_once(':')?;
     Some((base, component.parse().ok()?))
 }
 
-/// What nothing is known about keeps its name; vectors stay whole, and `name:0 name:1 …` become one.
-fn plan_others(columns: &mut Vec<Planned>, open: &Open<'_>) {
-    let free = || (0..open.slots.len()).filter(|i| !open.taken[*i]);
-    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
-    for i in free() {
-        let slot = &open.slots[i];
-        let (base, component) = match slot.component {
-            Some((c, _)) => (slot.name.as_str(), c),
-            None => numbered(&slot.name).unwrap_or((&slot.name, 0)),
+/// The standard name of a whole property, or the file's; positions and radii are no columns.
+fn column_name(name: &str) -> &str {
+    let standard = names::standard(name);
+    standard.filter(|s| ![names::POSITION, names::RADIUS].contains(s)).unwrap_or(name)
+}
+
+/// Slots that may be the components of one column.
+struct Group {
+    name: String,
+    /// Component and slot.
+    parts: Vec<(usize, usize)>,
+    /// Fields of their own, which stay so if components are missing.
+    is_joined: bool,
+}
+
+/// The slots without a purpose yet, joined by the names of their columns.
+fn groups(open: &Open<'_>) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for i in (0..open.slots.len()).filter(|i| !open.taken[*i]) {
+        let Slot { name, component, .. } = &open.slots[i];
+        let joined = || {
+            let standard = names::component(name).map(|(standard, c, _)| (standard, c));
+            standard.or_else(|| numbered(name).map(|(base, c)| (column_name(base), c)))
         };
-        match groups.iter_mut().find(|(name, slots)| name == base && slots.len() == component) {
-            Some((_, slots)) if component > 0 => slots.push(i),
-            _ if component == 0 => groups.push((base.into(), vec![i])),
-            _ => groups.push((slot.name.clone(), vec![i])),
+        let (name, component, is_joined) = match component {
+            Some((c, _)) => (column_name(name), *c, false),
+            None => match joined() {
+                Some((standard, c)) => (standard, c, true),
+                None => (column_name(name), 0, false),
+            },
+        };
+        let open_group = groups.iter_mut().find(|group| {
+            group.name == name
+                && group.is_joined == is_joined
+                && group.parts.iter().all(|(c, _)| *c != component)
+        });
+        match open_group {
+            Some(group) => group.parts.push((component, i)),
+            None => {
+                groups.push(Group { name: name.into(), parts: vec![(component, i)], is_joined })
+            }
         }
     }
-    for (base, slots) in groups {
-        // The standard spelling of a vector that was written component by component.
-        let known = VECTORS.iter().find(|(_, whole, _)| {
-            slots.len() > 1 && whole.iter().any(|w| w.eq_ignore_ascii_case(&base))
-        });
-        let name = known.map_or(base, |(name, ..)| (*name).into());
-        columns.push(Planned::keep(name, slots));
+    groups
+}
+
+impl Group {
+    /// One column, or one for each slot where the parts make no vector.
+    fn plan(mut self, open: &Open<'_>, columns: &mut Vec<Planned>) {
+        self.parts.sort_unstable();
+        let least = match (self.is_joined, self.name == names::COLOR) {
+            (true, true) => 3,
+            (true, false) => 2,
+            _ => 1,
+        };
+        let in_order = self.parts.iter().enumerate().all(|(i, (c, _))| i == *c);
+        let is_new = columns.iter().all(|column| column.name != self.name);
+        let slots = self.parts.iter().map(|(_, slot)| *slot);
+        if in_order && is_new && self.parts.len() >= least {
+            return columns.push(Planned::keep(self.name, slots.collect()));
+        }
+        columns.extend(slots.map(|slot| Planned::keep(&open.slots[slot].name, vec![slot])));
+    }
+}
+
+/// Colours to 0–1 unless they are bytes, opacity to transparency.
+fn plan_colours(columns: &mut Vec<Planned>, slots: &[Slot]) {
+    let Some(at) = columns.iter().position(|c| c.name == names::COLOR && c.slots.len() >= 3) else {
+        return;
+    };
+    let scalar = slots[columns[at].slots[0]].scalar;
+    if scalar != Scalar::U8 && !scalar.is_float() {
+        columns[at].conversion = Conversion::Scale(full_scale(scalar));
+    }
+    if columns[at].slots.len() == 4 {
+        let alpha = columns[at].slots.split_off(3);
+        columns.push(Planned::keep("alpha", alpha));
+    }
+    // `alpha` is opacity only beside a colour: elsewhere it is a viscosity or an angle.
+    let names = ["alpha", "diffuse_alpha", "a"];
+    let alpha = columns.iter_mut().find(|c| c.slots.len() == 1 && names.contains(&c.name.as_str()));
+    if let Some(alpha) = alpha {
+        alpha.name = names::TRANSPARENCY.into();
+        alpha.conversion = Conversion::Opacity(full_scale(slots[alpha.slots[0]].scalar));
     }
 }
 
@@ -314,8 +310,7 @@ impl Table {
             }
         }
         if let Some((slot, factor)) = plan.radius {
-            let lane = &lanes[slot];
-            self.radius.extend((0..rows).map(|row| (lane.number(row) * factor) as f32));
+            append_scaled(&mut self.radius, &lanes[slot], rows, factor);
         }
         for (planned, values) in plan.columns.iter().zip(&mut self.columns) {
             let parts: Vec<_> = planned.slots.iter().map(|slot| lanes[*slot]).collect();

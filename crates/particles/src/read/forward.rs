@@ -1,7 +1,6 @@
 //! Reading forward through a file, whether it is compressed or not.
 
 use std::io::Read;
-use std::sync::Arc;
 
 use super::Input;
 use crate::{Place, ReadError, Result};
@@ -12,14 +11,14 @@ const STEP_BYTES: usize = 4 << 20;
 /// An input and the stream last read from it: going on forward, even through a compressed file, never
 /// starts again from the beginning.
 pub(crate) struct Forward {
-    input: Arc<Input>,
+    input: Input,
     stream: Option<Box<dyn Read + Send>>,
     at: u64,
 }
 
 impl Forward {
     /// Nothing is read yet.
-    pub(crate) fn new(input: Arc<Input>) -> Self {
+    pub(crate) fn new(input: Input) -> Self {
         Self { input, stream: None, at: 0 }
     }
 

@@ -221,14 +221,32 @@ fn append_f64(values: &mut Values, lanes: &[Lane<'_>], rows: usize) {
     }
 }
 
-/// Appends `rows` positions of single-precision lanes.
+/// The numbers of a lane of little-endian single precision, without looking at its type in each row.
+fn singles<'a>(lane: &Lane<'a>, rows: usize) -> Option<impl Iterator<Item = f32> + 'a> {
+    let is_single = lane.scalar == Scalar::F32 && lane.order == ByteOrder::Little;
+    if !is_single || lane.stride == 0 || !lane.holds(rows) {
+        return None;
+    }
+    let rows = lane.bytes.get(lane.start..)?.chunks(lane.stride).take(rows);
+    Some(rows.map(|row| row.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes))))
+}
+
+/// Appends `rows` positions as single precision.
 pub(crate) fn append_positions(out: &mut Vec<[f32; 3]>, lanes: &[Lane<'_>; 3], rows: usize) {
-    out.reserve(rows);
-    if lanes.iter().all(|l| l.scalar == Scalar::F32 && l.order == ByteOrder::Little) {
-        let at = |lane: &Lane<'_>, row| f32::from_le_bytes(lane.at(row));
-        out.extend((0..rows).map(|row| std::array::from_fn(|i| at(&lanes[i], row))));
-    } else {
-        out.extend((0..rows).map(|row| std::array::from_fn(|i| lanes[i].number(row) as f32)));
+    let [x, y, z] = lanes.each_ref().map(|lane| singles(lane, rows));
+    match (x, y, z) {
+        (Some(x), Some(y), Some(z)) => out.extend(x.zip(y).zip(z).map(|((x, y), z)| [x, y, z])),
+        _ => {
+            out.extend((0..rows).map(|row| std::array::from_fn(|i| lanes[i].number(row) as f32)));
+        }
+    }
+}
+
+/// Appends `rows` numbers times `factor` as single precision.
+pub(crate) fn append_scaled(out: &mut Vec<f32>, lane: &Lane<'_>, rows: usize, factor: f64) {
+    match singles(lane, rows).filter(|_| factor == 1.0) {
+        Some(numbers) => out.extend(numbers),
+        None => out.extend((0..rows).map(|row| (lane.number(row) * factor) as f32)),
     }
 }
 

@@ -19,8 +19,10 @@ mod input;
 mod lanes;
 mod legacy_vtk;
 mod lines;
+mod elements;
 pub mod names;
 mod numpy;
+mod pdb;
 mod ply;
 mod rows;
 mod table;
@@ -107,6 +109,7 @@ pub trait Reader: Send {
 pub static FORMATS: &[&dyn Format] = &[
     &dump::LammpsDump,
     &xyz::Xyz,
+    &pdb::Pdb,
     &ply::Ply,
     &numpy::Npy,
     &numpy::Npz,

@@ -50,6 +50,13 @@ pub const NORMAL: &str = "Normal";
 /// Acceleration, three components.
 pub const ACCELERATION: &str = "Acceleration";
 
+/// Which of an atom's alternate locations it is.
+pub const ALTERNATE_LOCATION: &str = "Alternate Location";
+/// What tells residues of one number apart.
+pub const INSERTION_CODE: &str = "Insertion Code";
+/// 1 where the atom is of a ligand or solvent (a `HETATM` line), else 0.
+pub const HETATM: &str = "HETATM";
+
 /// Surface normal, three components.
 /// Angular momentum, three components.
 pub const ANGULAR_MOMENTUM: &str = "Angular Momentum";
@@ -70,6 +77,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
         PARTICLE_IDENTIFIER,
         &[
             "id",
+            "ids",
             "idp",
             "particle identifier",
             "particle_identifier",
@@ -118,6 +126,7 @@ const COMPONENTS: &[(&str, &[&str])] = &[
     (ORIENTATION, &["quati", "quatj", "quatk", "quatw"]),
     (COLOR, &["r", "g", "b"]),
     (COLOR, &["red", "green", "blue"]),
+    (COLOR, &["diffuse_red", "diffuse_green", "diffuse_blue"]),
 ];
 
 /// The standard name of a property that is spelled `name`, in any case.

@@ -43,20 +43,36 @@ pub(crate) fn read(path: &Path, number: usize) -> Particles {
     frame(&mut *reader, number)
 }
 
+/// The files that `of_interest` picks by name and that an independent reader could read, with its facts.
+pub(crate) fn facts(of_interest: impl Fn(&str) -> bool) -> Vec<(PathBuf, Value)> {
+    let Some(folder) = shared_data() else { return Vec::new() };
+    let facts = std::fs::read_to_string(folder.join("facts.json")).unwrap();
+    let Value::Array(facts) = serde_json::from_str(&facts).unwrap() else { panic!("no list") };
+    let path = |fact: &Value| folder.join(fact["file"].as_str().unwrap());
+    facts
+        .into_iter()
+        .filter(|fact| of_interest(fact["file"].as_str().unwrap()) && !fact["reader"].is_null())
+        .map(|fact| (path(&fact), fact))
+        .collect()
+}
+
 /// Holds every file that `of_interest` picks by its name against its facts; gives their number.
 pub(crate) fn check_facts(of_interest: impl Fn(&str) -> bool) -> usize {
-    let Some(folder) = shared_data() else { return 0 };
-    let facts = std::fs::read_to_string(folder.join("facts.json")).unwrap();
-    let facts: Value = serde_json::from_str(&facts).unwrap();
-    let mut checked = 0;
-    for fact in facts.as_array().unwrap() {
-        let file = fact["file"].as_str().unwrap();
-        if of_interest(file) && !fact["reader"].is_null() {
-            check_file(&folder.join(file), fact);
-            checked += 1;
-        }
+    check_facts_with(of_interest, Value::clone)
+}
+
+/// As [`check_facts`], with the facts' properties made ours by `renamed`.
+pub(crate) fn check_facts_with(
+    of_interest: impl Fn(&str) -> bool,
+    renamed: impl Fn(&Value) -> Value,
+) -> usize {
+    let facts = facts(of_interest);
+    for (path, fact) in &facts {
+        let mut fact = fact.clone();
+        fact["properties"] = renamed(&fact["properties"]);
+        check_file(path, &fact);
     }
-    checked
+    facts.len()
 }
 
 fn check_file(path: &Path, fact: &Value) {

@@ -11,8 +11,6 @@ mod zip;
 
 pub(super) use npz::Npz;
 
-use std::sync::Arc;
-
 use self::array::{Array, HEADER_BYTES, Item, MAGIC, View};
 use super::fields::{Plan, Slot, Table};
 use super::forward::Forward;
@@ -104,7 +102,7 @@ struct NpyReader {
 
 impl NpyReader {
     fn new(input: Input, array: Array, view: View) -> Result<Self> {
-        let mut reader = Self { whole: None, forward: Forward::new(Arc::new(input)), array, view };
+        let mut reader = Self { whole: None, forward: Forward::new(input), array, view };
         if let Some(all) = reader.forward.input().content_bytes() {
             reader.set_end(all)?;
         }

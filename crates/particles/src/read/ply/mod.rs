@@ -4,19 +4,17 @@
 //! text or binary in either byte order. Only `vertex` is read; faces and all else are passed over. A
 //! file without vertices is an empty frame.
 
+use std::path::PathBuf;
+
 mod header;
 mod rows;
-
-use std::sync::Arc;
-
-use rayon::prelude::*;
 
 use self::header::{Element, Encoding, Header, Kind};
 use self::rows::{Walk, pack_lines, packed_bytes};
 use super::fields::{Plan, Slot, Table};
 use super::forward::Forward;
 use super::lanes::{ByteOrder, Lane};
-use super::lines::{LineBlocks, Mark, lines, pieces};
+use super::text::{Lines, Mark};
 use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted};
 use crate::{Particles, Place, ReadError, Result};
 
@@ -42,13 +40,25 @@ impl Format for Ply {
 
     fn open(&self, input: Input) -> Result<Box<dyn Reader>> {
         let header = header::parse(input.path(), &input.read(0, HEADER_BYTES)?)?;
-        Ok(Box::new(PlyReader { input: Arc::new(input), header }))
+        let path = input.path().to_path_buf();
+        let body = match header.encoding {
+            Encoding::Ascii => Body::Text(Lines::new(input)),
+            Encoding::Binary(order) => Body::Binary(Forward::new(input), order),
+        };
+        Ok(Box::new(PlyReader { path, header, body }))
     }
 }
 
 struct PlyReader {
-    input: Arc<Input>,
+    path: PathBuf,
     header: Header,
+    body: Body,
+}
+
+/// What follows the header.
+enum Body {
+    Text(Lines),
+    Binary(Forward, ByteOrder),
 }
 
 /// Rows of one layout on their way into the table.
@@ -88,39 +98,38 @@ fn slots(element: &Element) -> Vec<(usize, Slot)> {
     slots
 }
 
-impl PlyReader {
-    fn error(&self, place: Place, message: impl Into<String>) -> ReadError {
-        ReadError::new(self.input.path(), place, message)
-    }
-
-    fn binary(&self, vertex: &Element, before: &[Element], rows: &mut Rows<'_>) -> Result<()> {
-        let mut forward = Forward::new(Arc::clone(&self.input));
-        forward.seek(self.header.bytes)?;
+impl Header {
+    fn binary(&self, forward: &mut Forward, at: usize, rows: &mut Rows<'_>) -> Result<()> {
+        let (before, vertex) = (&self.elements[..at], &self.elements[at]);
+        let error = |forward: &Forward, message: String| {
+            ReadError::new(forward.input().path(), Place::Byte(forward.at()), message)
+        };
+        forward.seek(self.bytes)?;
         for element in before {
             match element.row_bytes() {
                 Some(bytes) => {
                     let bytes = element.count.saturating_mul(bytes as u64);
                     if forward.skip(bytes)? < bytes {
                         let message = format!("the file ends inside its `{}`", element.name);
-                        return Err(self.error(Place::Byte(forward.at()), message));
+                        return Err(error(forward, message));
                     }
                 }
                 None => {
-                    let mut walk = Walk::new(&mut forward, rows.order);
+                    let mut walk = Walk::new(forward, rows.order);
                     walk.rows(element, element.count, None)?;
                     walk.finish()?;
                 }
             }
         }
         if vertex.row_bytes().is_none() {
-            return self.packed(vertex, &mut forward, rows);
+            return packed(vertex, forward, rows);
         }
         let row_bytes = rows.row_bytes as u64;
-        if let Some(all) = self.input.content_bytes() {
+        if let Some(all) = forward.input().content_bytes() {
             let there = all.saturating_sub(forward.at()) / row_bytes;
             if there < vertex.count {
                 let message = format!("expected {} vertices, found {there}", vertex.count);
-                return Err(self.error(Place::Byte(forward.at()), message));
+                return Err(error(forward, message));
             }
             rows.table.reserve(usize::try_from(vertex.count).unwrap_or(0));
         }
@@ -131,91 +140,69 @@ impl PlyReader {
             forward.read_exactly(&mut block, (now * row_bytes) as usize, "vertices")?;
             rows.push(&block);
             left -= now;
-            (rows.progress)(forward.at(), self.input.stored_bytes());
+            (rows.progress)(forward.at(), forward.input().stored_bytes());
         }
         Ok(())
     }
 
-    /// Binary vertices that have lists.
-    fn packed(&self, vertex: &Element, forward: &mut Forward, rows: &mut Rows<'_>) -> Result<()> {
-        let mut walk = Walk::new(forward, rows.order);
-        let mut packed = Vec::new();
-        let mut left = vertex.count;
-        while left > 0 {
-            let now = left.min((BLOCK_BYTES / rows.row_bytes).max(1) as u64);
-            packed.clear();
-            walk.rows(vertex, now, Some(&mut packed))?;
-            rows.push(&packed);
-            left -= now;
-        }
-        Ok(())
-    }
-
-    fn text(&self, vertex: &Element, before: &[Element], rows: &mut Rows<'_>) -> Result<()> {
-        let mut blocks = LineBlocks::new(Arc::clone(&self.input));
-        blocks.seek(Mark { byte: self.header.bytes, line: self.header.lines + 1 })?;
-        for element in before.iter().chain([vertex]) {
-            let is_vertex = std::ptr::eq(element, vertex);
+    fn text(&self, lines: &mut Lines, at: usize, rows: &mut Rows<'_>) -> Result<()> {
+        let (before, vertex) = (&self.elements[..at], &self.elements[at]);
+        lines.go_to(Mark { offset: self.bytes, line: self.lines + 1 })?;
+        for element in before {
             let mut left = element.count;
             while left > 0 {
-                let mark = blocks.mark();
-                let block = blocks.look()?;
-                if block.is_empty() {
-                    let name = &element.name;
-                    let message =
-                        format!("expected {left} more lines of `{name}`, found the file's end");
-                    return Err(self.error(Place::Line(mark.line), message));
-                }
-                let part = first_rows(block, left);
-                if is_vertex {
-                    self.pack(&block[..part.bytes], mark, vertex, rows)?;
-                }
-                left -= part.rows;
-                blocks.consume(part.bytes, part.lines);
-                (rows.progress)(blocks.mark().byte, self.input.stored_bytes());
+                let Some(block) = lines.block(left)? else {
+                    return Err(lines.cut(&format!("{left} more lines of `{}`", element.name)));
+                };
+                let full =
+                    block.bytes.split(|b| *b == b'\n').filter(|l| !l.trim_ascii().is_empty());
+                left -= full.count() as u64;
             }
         }
-        Ok(())
-    }
-
-    /// Packs a block in parallel, and adds its pieces in order.
-    fn pack(&self, block: &[u8], mark: Mark, vertex: &Element, rows: &mut Rows<'_>) -> Result<()> {
-        let pieces = pieces(block, 4 * rayon::current_num_threads());
-        let packed: Vec<_> = pieces.par_iter().map(|piece| pack_lines(piece, vertex)).collect();
-        for (i, packed) in packed.into_iter().enumerate() {
-            match packed {
-                Ok(packed) => rows.push(&packed),
-                Err((line, message)) => {
-                    let before: usize = pieces[..i].iter().map(|piece| lines(piece).count()).sum();
-                    let place = Place::Line(mark.line + before as u64 + line);
-                    return Err(self.error(place, message));
+        let mut left = vertex.count;
+        while left > 0 {
+            // A row is a line that is not blank.
+            let Some(block) = lines.block(left)? else {
+                return Err(lines.cut(&format!("{left} more vertices")));
+            };
+            match block.map_chunks(|text| pack_lines(text, vertex)) {
+                Ok(packed) => {
+                    for packed in packed {
+                        left -= (packed.len() / rows.row_bytes) as u64;
+                        rows.push(&packed);
+                    }
+                }
+                Err(wrong) => {
+                    let line = block.line_of(wrong.at);
+                    return Err(lines.error(line, wrong.message));
                 }
             }
+            let (done, all) = lines.progress();
+            (rows.progress)(done, all);
         }
         Ok(())
     }
 }
 
-/// The part of a block with at most so many rows.
-#[derive(Default)]
-struct Part {
-    bytes: usize,
-    lines: u64,
-    rows: u64,
+/// Binary vertices that have lists.
+fn packed(vertex: &Element, forward: &mut Forward, rows: &mut Rows<'_>) -> Result<()> {
+    let mut walk = Walk::new(forward, rows.order);
+    let mut packed = Vec::new();
+    let mut left = vertex.count;
+    while left > 0 {
+        let now = left.min((BLOCK_BYTES / rows.row_bytes).max(1) as u64);
+        packed.clear();
+        walk.rows(vertex, now, Some(&mut packed))?;
+        rows.push(&packed);
+        left -= now;
+    }
+    Ok(())
 }
 
-/// The first `most` rows of a block, or all: a row is a line that is not blank.
-fn first_rows(block: &[u8], most: u64) -> Part {
-    let mut part = Part::default();
-    for line in lines(block) {
-        if part.rows == most {
-            break;
-        }
-        part.bytes += line.len();
-        part.lines += 1;
-        part.rows += u64::from(!line.trim_ascii().is_empty());
+impl PlyReader {
+    fn error(&self, place: Place, message: impl Into<String>) -> ReadError {
+        ReadError::new(&self.path, place, message)
     }
-    part
 }
 
 impl Reader for PlyReader {
@@ -231,7 +218,7 @@ impl Reader for PlyReader {
         let Some(at) = elements.iter().position(|e| e.name == "vertex" && e.count > 0) else {
             return Ok(Particles::default());
         };
-        let (before, vertex) = (&elements[..at], &elements[at]);
+        let vertex = &elements[at];
         let slots = slots(vertex);
         let all: Vec<_> = slots.iter().map(|(_, slot)| slot.clone()).collect();
         let plan = Plan::new(&all, wanted).ok_or_else(|| {
@@ -239,15 +226,15 @@ impl Reader for PlyReader {
             let message = format!("expected vertices with x, y and z, found {}", found.join(", "));
             self.error(Place::Whole, message)
         })?;
-        let order = match self.header.encoding {
-            Encoding::Ascii => ByteOrder::Little,
-            Encoding::Binary(order) => order,
+        let order = match &self.body {
+            Body::Text(_) => ByteOrder::Little,
+            Body::Binary(_, order) => *order,
         };
         let table = Table::new(plan);
         let mut rows = Rows { slots, row_bytes: packed_bytes(vertex), order, table, progress };
-        match self.header.encoding {
-            Encoding::Ascii => self.text(vertex, before, &mut rows)?,
-            Encoding::Binary(_) => self.binary(vertex, before, &mut rows)?,
+        match &mut self.body {
+            Body::Text(lines) => self.header.text(lines, at, &mut rows)?,
+            Body::Binary(forward, _) => self.header.binary(forward, at, &mut rows)?,
         }
         Ok(rows.table.finish())
     }

@@ -5,7 +5,7 @@
 
 use crate::read::forward::Forward;
 use crate::read::lanes::{ByteOrder, Lane, Scalar};
-use crate::read::lines::lines;
+use crate::read::text::{Wrong, integer, shown};
 use crate::{Place, ReadError, Result};
 
 use super::header::{Element, Kind};
@@ -108,16 +108,15 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Packs lines of text, blank ones left out; the error comes with the number of its line, from 0.
-pub(super) fn pack_lines(
-    text: &[u8],
-    element: &Element,
-) -> std::result::Result<Vec<u8>, (u64, String)> {
+/// Packs lines of text, blank ones left out.
+pub(super) fn pack_lines(text: &[u8], element: &Element) -> std::result::Result<Vec<u8>, Wrong> {
     let mut packed = Vec::with_capacity(text.len() / 2);
-    for (number, line) in (0..).zip(lines(text)) {
+    let mut at = 0;
+    for line in text.split_inclusive(|b| *b == b'\n') {
         if !line.trim_ascii().is_empty() {
-            pack_line(line, element, &mut packed).map_err(|message| (number, message))?;
+            pack_line(line, element, &mut packed).map_err(|message| Wrong { at, message })?;
         }
+        at += line.len();
     }
     Ok(packed)
 }
@@ -132,14 +131,11 @@ fn pack_line(
         let name = &property.name;
         let word =
             words.next().ok_or_else(|| format!("expected `{name}`, found the line's end"))?;
-        let wrong = |what: &str| format!("expected {what} `{name}`, found `{}`", show(word));
+        let wrong = |what: &str| format!("expected {what} `{name}`, found {}", shown(word));
         match property.kind {
             Kind::Scalar(scalar) => pack(word, scalar, packed).ok_or_else(|| wrong("a number"))?,
             Kind::List { .. } => {
-                let items: u64 = std::str::from_utf8(word)
-                    .ok()
-                    .and_then(|w| w.parse().ok())
-                    .ok_or_else(|| wrong("the length of list"))?;
+                let items = integer(word).ok_or_else(|| wrong("the length of list"))?;
                 for _ in 0..items {
                     words.next().ok_or_else(|| format!("expected {items} items of `{name}`"))?;
                 }
@@ -148,13 +144,8 @@ fn pack_line(
     }
     match words.next() {
         None => Ok(()),
-        Some(word) => Err(format!("expected the line's end, found `{}`", show(word))),
+        Some(word) => Err(format!("expected the line's end, found {}", shown(word))),
     }
-}
-
-/// A word fit for a message.
-fn show(word: &[u8]) -> String {
-    String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned()
 }
 
 /// Appends the number `word`, little-endian; `None` where it is none, or does not fit.
@@ -166,7 +157,7 @@ fn pack(word: &[u8], scalar: Scalar, packed: &mut Vec<u8>) -> Option<()> {
         }
         _ => {
             let bytes = scalar.bytes();
-            let value = integer(word)?;
+            let value = whole(word)?;
             let (low, high) = match scalar {
                 Scalar::I8 | Scalar::I16 | Scalar::I32 => {
                     (-(1i64 << (8 * bytes - 1)), (1i64 << (8 * bytes - 1)) - 1)
@@ -184,10 +175,9 @@ fn pack(word: &[u8], scalar: Scalar, packed: &mut Vec<u8>) -> Option<()> {
 }
 
 /// An integer; also one written as `255.0`, as some writers do.
-fn integer(word: &[u8]) -> Option<i64> {
-    if let Some(value) = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()) {
-        return Some(value);
-    }
-    let value: f64 = fast_float2::parse(word).ok()?;
-    (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64)
+fn whole(word: &[u8]) -> Option<i64> {
+    integer(word).or_else(|| {
+        let value: f64 = fast_float2::parse(word).ok()?;
+        (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64)
+    })
 }

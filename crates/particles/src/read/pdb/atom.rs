@@ -1,0 +1,343 @@
+//! `ATOM` and `HETATM` lines: columns to values.
+
+use std::collections::HashMap;
+
+use crate::read::elements::symbol;
+use crate::read::text::{Wrong, integer, shown};
+use crate::read::{Wanted, names};
+use crate::{Column, Particles, PositionBuilder, Values};
+
+/// Whether a line is a particle.
+pub(super) fn is_atom(line: &[u8]) -> bool {
+    line.starts_with(b"ATOM  ") || line.starts_with(b"HETATM")
+}
+
+/// The three coordinates in columns 31–54, each of eight columns.
+pub(super) fn numbers(place: &[u8]) -> Option<[f64; 3]> {
+    let mut values = [0.0; 3];
+    for (value, field) in values.iter_mut().zip(place.chunks_exact(8)) {
+        *value = fast_float2::parse(field.trim_ascii()).ok()?;
+    }
+    Some(values)
+}
+
+/// Words of up to four bytes, with their dictionary in order of first appearance.
+#[derive(Clone, Debug, Default)]
+struct Words {
+    codes: Vec<u32>,
+    words: Vec<[u8; 4]>,
+    index: HashMap<[u8; 4], u32>,
+}
+
+impl Words {
+    fn code(&mut self, word: [u8; 4]) -> u32 {
+        let next = self.words.len() as u32;
+        let words = &mut self.words;
+        *self.index.entry(word).or_insert_with(|| {
+            words.push(word);
+            next
+        })
+    }
+
+    fn push(&mut self, word: &[u8]) {
+        let word = word.trim_ascii();
+        let mut key = [0; 4];
+        let bytes = word.len().min(4);
+        key[..bytes].copy_from_slice(&word[..bytes]);
+        let last = self.codes.last().filter(|code| self.words[**code as usize] == key).copied();
+        let code = last.unwrap_or_else(|| self.code(key));
+        self.codes.push(code);
+    }
+
+    fn append(&mut self, other: Self) {
+        let codes: Vec<_> = other.words.into_iter().map(|word| self.code(word)).collect();
+        self.codes.extend(other.codes.into_iter().map(|code| codes[code as usize]));
+    }
+
+    fn finish(self) -> Values {
+        let text = |word: [u8; 4]| String::from_utf8_lossy(&word).trim_end_matches('\0').to_owned();
+        Values::Names { codes: self.codes, names: self.words.into_iter().map(text).collect() }
+    }
+
+    fn is_blank(&self) -> bool {
+        self.words.iter().all(|word| *word == [0; 4])
+    }
+}
+
+/// A number that the file's columns were too narrow for.
+const OVERFLOWED: i64 = i64::MIN;
+
+/// Particles column by column.
+#[derive(Default)]
+pub(super) struct Atoms {
+    positions: Vec<[f64; 3]>,
+    serials: Vec<i64>,
+    residues: Vec<i64>,
+    occupancies: Vec<f64>,
+    b_factors: Vec<f64>,
+    charges: Vec<i32>,
+    hetatm: Vec<u8>,
+    elements: Words,
+    atoms: Words,
+    residue_names: Words,
+    chains: Words,
+    alternates: Words,
+    insertions: Words,
+}
+
+/// Columns `first` to `last` of a line, counted from 1; what is not there is blank.
+fn columns(line: &[u8], first: usize, last: usize) -> &[u8] {
+    line.get(first - 1..last.min(line.len())).unwrap_or_default()
+}
+
+/// A serial or residue number: decimal; `A000` after `9999` (hybrid-36); hexadecimal; or stars.
+fn number(field: &[u8]) -> Option<i64> {
+    let field = field.trim_ascii();
+    if field.is_empty() || field.iter().all(|b| *b == b'*') {
+        return Some(OVERFLOWED);
+    }
+    integer(field)
+        .or_else(|| hybrid36(field))
+        .or_else(|| i64::from_str_radix(std::str::from_utf8(field).ok()?, 16).ok())
+}
+
+/// Numbers beyond the decimals of a field's width, which must be full (Grosse-Kunstleve, *hybrid-36*):
+/// base 36 in capitals from `A0…`, then in small letters from `a0…`.
+fn hybrid36(field: &[u8]) -> Option<i64> {
+    let width = u32::try_from(field.len()).ok().filter(|w| matches!(w, 4 | 5))?;
+    let is_small = match field[0] {
+        b'A'..=b'Z' => false,
+        b'a'..=b'z' => true,
+        _ => return None,
+    };
+    let value = field.iter().try_fold(0, |value, byte| {
+        let digit = match byte {
+            b'0'..=b'9' => byte - b'0',
+            b'A'..=b'Z' if !is_small => byte - b'A' + 10,
+            b'a'..=b'z' if is_small => byte - b'a' + 10,
+            _ => return None,
+        };
+        Some(value * 36 + i64::from(digit))
+    })?;
+    let block = 36i64.pow(width - 1);
+    Some(value + 10i64.pow(width) + if is_small { 16 * block } else { -10 * block })
+}
+
+/// Residues of which all atoms are H, C, N, O, P or S.
+#[rustfmt::skip]
+const BIOPOLYMER: &[&[u8]] = &[
+    b"ALA", b"ARG", b"ASN", b"ASP", b"CYS", b"GLN", b"GLU", b"GLY", b"HIS", b"ILE", b"LEU", b"LYS",
+    b"MET", b"PHE", b"PRO", b"SER", b"THR", b"TRP", b"TYR", b"VAL", b"ASX", b"GLX", b"HSD", b"HSE",
+    b"HSP", b"HID", b"HIE", b"HIP", b"CYX", b"CYM", b"ASH", b"GLH", b"LYN", b"ACE", b"NME", b"NH2",
+    b"A", b"C", b"G", b"U", b"I", b"DA", b"DC", b"DG", b"DT", b"DU", b"DI",
+    b"HOH", b"WAT", b"SOL", b"TIP3", b"TIP", b"TP3", b"DOD", b"H2O",
+];
+
+/// The element: columns 77–78; else, by the rule for atom names, the right-justified symbol in columns
+/// 13–14. `X` where that is none.
+///
+/// Programs that write names from column 13 on break the rule (`CA` would be calcium); in amino acids,
+/// nucleotides and water the first letter decides.
+fn element(line: &[u8]) -> &'static str {
+    if let Some(symbol) = symbol(columns(line, 77, 78).trim_ascii()) {
+        return symbol;
+    }
+    let name = columns(line, 13, 16);
+    let letters = name.trim_ascii_start().trim_ascii_start();
+    let letters = &letters[letters.iter().take_while(|b| b.is_ascii_digit()).count()..];
+    let one = symbol(letters.get(..1).unwrap_or_default());
+    let two = name.get(..2).filter(|two| two.iter().all(u8::is_ascii_alphabetic)).and_then(symbol);
+    let is_full_hydrogen = name.first() == Some(&b'H') && name.trim_ascii().len() == 4;
+    let residue = columns(line, 18, 21).trim_ascii();
+    match two {
+        Some(two) if !is_full_hydrogen && !BIOPOLYMER.contains(&residue) => two,
+        _ => one.unwrap_or("X"),
+    }
+}
+
+/// `2+`, `1-`, also `+2`; 0 where there is none.
+fn charge(field: &[u8]) -> i32 {
+    match field.trim_ascii() {
+        [digit @ b'0'..=b'9', b'+'] | [b'+', digit @ b'0'..=b'9'] => i32::from(digit - b'0'),
+        [digit @ b'0'..=b'9', b'-'] | [b'-', digit @ b'0'..=b'9'] => -i32::from(digit - b'0'),
+        _ => 0,
+    }
+}
+
+/// A real number, or `default` where the columns are blank or full of stars.
+fn real(line: &[u8], first: usize, last: usize, default: f64) -> Result<f64, String> {
+    let field = columns(line, first, last).trim_ascii();
+    if field.iter().all(|b| *b == b'*') {
+        return Ok(default);
+    }
+    fast_float2::parse(field)
+        .map_err(|_| format!("expected a number in columns {first}–{last}, found {}", shown(field)))
+}
+
+impl Atoms {
+    /// The particles among the lines of `text`.
+    pub(super) fn parse(text: &[u8], wanted: &Wanted) -> Result<Self, Wrong> {
+        let mut atoms = Self::default();
+        let mut at = 0;
+        for line in text.split_inclusive(|b| *b == b'\n') {
+            if is_atom(line) {
+                let line = line.trim_ascii_end();
+                atoms.push(line, wanted).map_err(|message| Wrong { at, message })?;
+            }
+            at += line.len();
+        }
+        Ok(atoms)
+    }
+
+    fn push(&mut self, line: &[u8], wanted: &Wanted) -> Result<(), String> {
+        let place = columns(line, 31, 54);
+        let wrong = || format!("expected x, y and z in columns 31–54, found {}", shown(place));
+        // The last figures of z may have been cut off, unless its point is where it must be.
+        let position = numbers(place).filter(|_| place.len() > 20).ok_or_else(wrong)?;
+        self.positions.push(position);
+        let serial = columns(line, 7, if columns(line, 12, 12) == b" " { 11 } else { 12 });
+        let serial = number(serial).or_else(|| number(columns(line, 7, 11)));
+        self.serials.push(serial.unwrap_or(OVERFLOWED));
+        // Five digits where a program needed them, with no room for an insertion code.
+        let is_wide = columns(line, 23, 27).iter().all(u8::is_ascii_digit);
+        let residue = number(columns(line, 23, if is_wide { 27 } else { 26 }));
+        self.residues.push(residue.unwrap_or(OVERFLOWED));
+        self.occupancies.push(real(line, 55, 60, 1.0)?);
+        self.b_factors.push(real(line, 61, 66, 0.0)?);
+        self.charges.push(charge(columns(line, 79, 80)));
+        self.hetatm.push(u8::from(line.starts_with(b"HETATM")));
+        let mut word = |words: fn(&mut Self) -> &mut Words, name: &str, word: &[u8]| {
+            if wanted.wants(name) {
+                words(self).push(word);
+            }
+        };
+        word(|a| &mut a.elements, names::PARTICLE_TYPE, element(line).as_bytes());
+        word(|a| &mut a.atoms, names::ATOM_NAME, columns(line, 13, 16));
+        word(|a| &mut a.residue_names, names::RESIDUE_NAME, columns(line, 18, 21));
+        word(|a| &mut a.chains, names::CHAIN, columns(line, 22, 22));
+        word(|a| &mut a.alternates, names::ALTERNATE_LOCATION, columns(line, 17, 17));
+        let insertion = if is_wide { &[] } else { columns(line, 27, 27) };
+        word(|a| &mut a.insertions, names::INSERTION_CODE, insertion);
+        Ok(())
+    }
+
+    /// Adds what follows.
+    pub(super) fn append(&mut self, other: Self) {
+        self.positions.extend(other.positions);
+        self.serials.extend(other.serials);
+        self.residues.extend(other.residues);
+        self.occupancies.extend(other.occupancies);
+        self.b_factors.extend(other.b_factors);
+        self.charges.extend(other.charges);
+        self.hetatm.extend(other.hetatm);
+        self.elements.append(other.elements);
+        self.atoms.append(other.atoms);
+        self.residue_names.append(other.residue_names);
+        self.chains.append(other.chains);
+        self.alternates.append(other.alternates);
+        self.insertions.append(other.insertions);
+    }
+
+    /// The frame. Columns that are blank in every line are left out.
+    pub(super) fn finish(mut self, wanted: &Wanted) -> Particles {
+        // A serial that did not fit counts on; a residue that did not fit is that before it.
+        fill(&mut self.serials, 1);
+        fill(&mut self.residues, 0);
+        let mut builder = PositionBuilder::default();
+        builder.push(&self.positions);
+        let (origin, positions) = builder.finish();
+        let residues = self.residues.into_iter().map(|n| n as i32).collect();
+        let mut columns = Vec::new();
+        let mut add = |name: &str, values: Values| {
+            if wanted.wants(name) && values.len() == positions.len() {
+                columns.push(Column::new(name, 1, values));
+            }
+        };
+        add(names::PARTICLE_IDENTIFIER, Values::I64(self.serials));
+        add(names::PARTICLE_TYPE, self.elements.finish());
+        add(names::ATOM_NAME, self.atoms.finish());
+        add(names::RESIDUE_NAME, self.residue_names.finish());
+        add(names::RESIDUE_IDENTIFIER, Values::I32(residues));
+        for (name, words) in [
+            (names::CHAIN, self.chains),
+            (names::ALTERNATE_LOCATION, self.alternates),
+            (names::INSERTION_CODE, self.insertions),
+        ] {
+            if !words.is_blank() {
+                add(name, words.finish());
+            }
+        }
+        add(names::OCCUPANCY, Values::F64(self.occupancies));
+        add(names::B_FACTOR, Values::F64(self.b_factors));
+        if self.charges.iter().any(|charge| *charge != 0) {
+            add(names::CHARGE, Values::I32(self.charges));
+        }
+        add(names::HETATM, Values::U8(self.hetatm));
+        Particles { origin, positions, columns, ..Particles::default() }
+    }
+}
+
+/// Replaces numbers that did not fit by the one before plus `step`.
+fn fill(numbers: &mut [i64], step: i64) {
+    let mut last = 0;
+    for number in numbers {
+        if *number == OVERFLOWED {
+            *number = last + step;
+        }
+        last = *number;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hybrid_36_goes_on_where_decimals_end() {
+        let known = [
+            (&b"99999"[..], 99_999),
+            (b"A0000", 100_000),
+            (b"A000Z", 100_035),
+            (b"ZZZZZ", 43_770_015),
+            (b"a0000", 43_770_016),
+            (b"zzzzz", 87_440_031),
+            (b"A000", 10_000),
+            (b"zzzz", 2_436_111),
+            (b"-999", -999),
+            (b"186a0", 100_000),
+            (b"*****", OVERFLOWED),
+        ];
+        for (field, value) in known {
+            assert_eq!(number(field), Some(value), "{}", shown(field));
+        }
+    }
+
+    #[test]
+    fn the_element_is_the_column_else_the_name() {
+        let known: [(&[u8], &str); 9] = [
+            (
+                b"HETATM    1 ZN   LIG     1       7.534   5.301   5.301  1.00  0.00          Zn  ",
+                "Zn",
+            ),
+            (b"ATOM      2  CA  MET A   1      26.198  25.467   2.821  1.00  9.72", "C"),
+            (b"HETATM    2 CA    CA A   1      26.198  25.467   2.821  1.00  9.72", "Ca"),
+            (b"ATOM      2 CA   MET A   1      26.198  25.467   2.821  1.00  9.72      5DFR", "C"),
+            (b"ATOM      2 HG11 VAL A   1      26.198  25.467   2.821  1.00  9.72", "H"),
+            (b"ATOM      2 1HB  LIG A   1      26.198  25.467   2.821  1.00  9.72", "H"),
+            (
+                b"HETATM    2 FE   HEM A   1      26.198  25.467   2.821  1.00  9.72      1ABC1234",
+                "Fe",
+            ),
+            (b"HETATM    2 HE21 LIG A   1      26.198  25.467   2.821  1.00  9.72", "H"),
+            (b"HETATM    2  Q1  LIG A   1      26.198  25.467   2.821  1.00  9.72", "X"),
+        ];
+        for (line, expected) in known {
+            assert_eq!(element(line), expected, "{}", shown(line));
+        }
+    }
+
+    #[test]
+    fn charges_are_written_either_way() {
+        assert_eq!([&b"2+"[..], b"1-", b"+3", b"  ", b"xy"].map(charge), [2, -1, 3, 0, 0]);
+    }
+}
