@@ -5,10 +5,12 @@
 //!
 //! 1. [`Tone`] sets exposure and curve of what was rendered;
 //! 2. [`Background`] puts something behind it;
-//! 3. [`Rgba8`], [`write_png`], [`write_exr`] and [`write_npz`] make bytes of it, [`save`] a file.
+//! 3. [`Annotations`] draw legend, scale bar, axes and lines over it;
+//! 4. [`Rgba8`], [`write_png`], [`write_exr`] and [`write_npz`] make bytes of it, [`save`] a file.
 //!
 //! Invariant: nothing here knows a camera, a scene or a particle; annotations come as pixels and labels.
 
+mod annotate;
 mod background;
 mod compare;
 mod error;
@@ -18,8 +20,12 @@ mod frame;
 mod npz;
 mod png;
 mod srgb;
+mod ticks;
 mod tone;
 
+pub use annotate::{
+    Annotations, Axes, Category, Ink, Legend, LegendKeys, Line, LineEnd, Lines, ScaleBar, Side,
+};
 pub use background::Background;
 pub use compare::{Difference, compare};
 pub use error::{FrameError, Result};
@@ -29,4 +35,5 @@ pub use frame::{Frame, Layer, Values};
 pub use npz::write_npz;
 pub use png::{PngOptions, Transparency, read_png, scene_in_png, write_png};
 pub use srgb::{Rgba8, linear_from_srgb, srgb_from_linear};
+pub use ticks::{Ticks, ticks};
 pub use tone::{Curve, Tone};

@@ -83,7 +83,9 @@ fn pictures_without_pixels_are_refused_by_name() {
     Background::Solid([1.0; 3]).put_behind(&mut nothing);
 }
 
-fn exr_parts(frame: &Frame) -> Vec<(String, Vec<(String, Vec<f64>)>)> {
+type Channels = Vec<(String, Vec<f64>)>;
+
+fn exr_parts(frame: &Frame) -> Vec<(String, Channels)> {
     use exr::prelude::*;
     let mut file = Cursor::new(Vec::new());
     write_exr(frame, &mut file).unwrap();
@@ -168,6 +170,7 @@ fn an_npz_holds_every_array_byte_for_byte() {
 }
 
 #[test]
+#[expect(clippy::print_stdout, reason = "a test that checks nothing says so")]
 fn numpy_reads_the_npz() {
     let directory = tempdir("numpy");
     let path = directory.join("layers.npz");
