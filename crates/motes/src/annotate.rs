@@ -141,8 +141,7 @@ fn caption(systems: &[Loaded], frame: usize) -> String {
 }
 
 fn axes(view: &CameraView) -> Axes {
-    let seen = |v: DVec3| {
-        [v.dot(view.right) as f32, v.dot(view.up) as f32, -v.dot(view.forward) as f32]
-    };
+    let seen =
+        |v: DVec3| [v.dot(view.right) as f32, v.dot(view.up) as f32, -v.dot(view.forward) as f32];
     Axes { directions: [DVec3::X, DVec3::Y, DVec3::Z].map(seen), side: Side::Left }
 }

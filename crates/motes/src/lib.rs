@@ -13,7 +13,6 @@
 
 mod annotate;
 mod error;
-mod expression;
 mod info;
 mod paint;
 mod picture;

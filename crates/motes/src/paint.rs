@@ -22,9 +22,15 @@ pub(crate) struct Paint {
 enum How {
     Uniform(Vec3),
     /// The colours of the file: a column, and the factor that brings it to 0..=1.
-    Own { column: usize, scale: f64 },
+    Own {
+        column: usize,
+        scale: f64,
+    },
     /// A kind per particle, and the colours of the kinds.
-    Kinds { kinds: Vec<u32>, colors: Vec<Vec3> },
+    Kinds {
+        kinds: Vec<u32>,
+        colors: Vec<Vec3>,
+    },
     Mapped(Mapped),
 }
 
@@ -245,9 +251,8 @@ fn automatic(particles: &Particles, coloring: &Coloring) -> (How, Meaning) {
 
 /// A colour the file gives, in sRGB.
 fn own_color(column: &Column, row: usize, scale: f64) -> Vec3 {
-    let channel = |c| {
-        motes_scene::linear_from_srgb((column.number(row, c) * scale).clamp(0.0, 1.0) as f32)
-    };
+    let channel =
+        |c| motes_scene::linear_from_srgb((column.number(row, c) * scale).clamp(0.0, 1.0) as f32);
     Vec3::new(channel(0), channel(1), channel(2))
 }
 
@@ -324,8 +329,7 @@ fn by_property(
         missing: Vec3::from(coloring.missing.linear()),
     };
     let title = title_of(particles, property, name);
-    let meaning =
-        Meaning::Range { title, range, colors: table.to_vec(), log: coloring.log };
+    let meaning = Meaning::Range { title, range, colors: table.to_vec(), log: coloring.log };
     Ok((How::Mapped(mapped), meaning))
 }
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use motes_frame::{Frame, PngOptions, Transparency, save, write_exr, write_npz, write_png};
 
-use crate::stats::Stats;
 use crate::Result;
+use crate::stats::Stats;
 
 /// A finished picture.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ impl Picture {
     /// # Errors
     /// The file cannot be written.
     pub fn save_png(&self, path: &Path) -> Result<()> {
-        let transparency = if self.transparent { Transparency::Keep } else { Transparency::Opaque };
+        let transparency = if self.transparent { Transparency::Keep } else { Transparency::Drop };
         let options = PngOptions { transparency, scene: Some(&self.scene) };
         Ok(save(path, |out| write_png(&self.shown, options, out))?)
     }

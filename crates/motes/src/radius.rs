@@ -28,9 +28,10 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
         return Rule::Uniform(radius as f32);
     }
     let types = particles.column(names::PARTICLE_TYPE);
-    let given = (!system.radii.is_empty()).then_some(types).flatten().map(|column| {
-        per_type(column, |name| system.radii.get(name).map(|r| *r as f32))
-    });
+    let given = (!system.radii.is_empty())
+        .then_some(types)
+        .flatten()
+        .map(|column| per_type(column, |name| system.radii.get(name).map(|r| *r as f32)));
     let rest = match &particles.radius {
         Radius::Uniform(r) => Rule::Uniform(*r),
         Radius::Each(radii) => Rule::Each(radii.clone()),
@@ -108,8 +109,7 @@ pub(crate) fn classes(
         }
         Rule::HalfSpacing => {
             // The least radius there is lets the grid be as fine as λ says.
-            let mut grid =
-                Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
+            let mut grid = Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
             let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
             grid.set_radius(radius * scale);
             let left_out = positions.len() - grid.len();

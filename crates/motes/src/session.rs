@@ -119,26 +119,40 @@ impl Session {
         for (i, particles) in particles.into_iter().enumerate() {
             let Some(particles) = particles else { continue };
             let of = (&self.scene, &self.scene.system[i]);
-            loaded.push(Loaded::new(particles, of, origin, self.ranges[i])?);
+            loaded.push(Loaded::new(particles, of, (i as u16, origin), self.ranges[i])?);
         }
         stats.ms.insert("build", milliseconds(start));
 
         let resolved = self.scene.resolve(bounds(&loaded, origin, self.scene.overlay.r#box))?;
+        // Lines in space are hidden by depth.
+        let show_box = self.scene.overlay.r#box;
+        let layers =
+            layers == Layers::Yes || loaded.iter().any(|l| frames_box(&l.particles, show_box));
         let start = Instant::now();
         let raw = self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?;
         stats.ms.insert("trace", milliseconds(start));
 
         let start = Instant::now();
-        let shown = self.finish(&raw, &resolved, &annotated(&loaded, origin, frame, self));
+        let shown = self.finish(&raw, &resolved, &Annotated { systems: &loaded, frame });
         stats.ms.insert("finish", milliseconds(start));
         count(&mut stats, &loaded);
         stats.hash = format!("{:016x}", raw.hash());
         stats.peak_memory = peak_memory_bytes();
-        Ok(Picture { raw, shown, stats, scene: self.scene.to_toml()?, transparent: self.scene.image.transparent })
+        Ok(Picture {
+            raw,
+            shown,
+            stats,
+            scene: self.scene.to_toml(),
+            transparent: self.scene.image.transparent,
+        })
     }
 
     /// Reads the frame of every visible system; `None` for hidden ones.
-    fn read(&mut self, frame: usize, watch: &dyn Watch) -> Result<Vec<Option<Arc<motes_particles::Particles>>>> {
+    fn read(
+        &mut self,
+        frame: usize,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Option<Arc<motes_particles::Particles>>>> {
         let report = |done, total| _ = watch.progress("read", done, total);
         let mut all = Vec::new();
         for i in 0..self.series.len() {
@@ -164,15 +178,13 @@ impl Session {
         &self,
         loaded: &[Loaded],
         (resolved, origin): (&Resolved, DVec3),
-        layers: Layers,
+        layers: bool,
         (stats, watch): (&mut Stats, &dyn Watch),
     ) -> Result<Frame> {
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<Spheres<'_>> = loaded
-            .iter()
-            .map(|l| Spheres { classes: &l.classes, visible: &l.visible })
-            .collect();
+        let systems: Vec<Spheres<'_>> =
+            loaded.iter().map(|l| Spheres { classes: &l.classes, visible: &l.visible }).collect();
         let rays = resolved.view.rays(origin);
         let view = View {
             rays: &rays,
@@ -185,16 +197,15 @@ impl Session {
             size: (image.width, image.height),
             samples: image.samples,
             packet: self.scene.spheres.packet,
-            // Lines in space are hidden by depth.
-            layers: true,
+            layers,
             level,
         };
         let tell = |done, total| watch.progress("render", done, total);
         let traced = motes_spheres::render(view, settings, &tell).ok_or(Error::Cancelled)?;
         stats.counts.insert("tests", traced.counts.tests);
         stats.counts.insert("spheres", traced.counts.spheres);
-        let _ = layers;
-        Ok(with_layers(Frame::new(image.width as usize, image.height as usize, traced.color)?, &traced.center)?)
+        let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
+        if layers { with_layers(frame, &traced.center, loaded) } else { Ok(frame) }
     }
 
     /// Tone, background and annotations.
@@ -295,17 +306,14 @@ fn bounds(loaded: &[Loaded], origin: DVec3, show_box: Show) -> Option<Bounds> {
     loaded.iter().flat_map(|l| [l.bounds(origin), of_box(l)]).flatten().reduce(Bounds::union)
 }
 
-fn annotated<'a>(loaded: &'a [Loaded], origin: DVec3, frame: usize, session: &'a Session) -> Annotated<'a> {
-    let _ = (origin, session);
-    Annotated { systems: loaded, frame }
-}
-
-fn with_layers(frame: Frame, center: &[Center]) -> Result<Frame> {
+fn with_layers(frame: Frame, center: &[Center], loaded: &[Loaded]) -> Result<Frame> {
     Ok(frame
         .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
         .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
         .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
-        .with(Layer::System(center.iter().map(|c| c.system).collect()))?)
+        .with(Layer::System(
+            center.iter().map(|c| loaded.get(c.system as usize).map_or(0, |l| l.number)).collect(),
+        ))?)
 }
 
 fn count(stats: &mut Stats, loaded: &[Loaded]) {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
-use motes_particles::expression::{Selection, select};
 use motes_particles::Particles;
+use motes_particles::expression::{Selection, select};
 use motes_scene::{Bounds, Scene, System};
 
 use crate::paint::{Paint, Property};
@@ -13,6 +13,8 @@ use crate::{Error, Result, radius};
 
 /// A system ready to be drawn.
 pub(crate) struct Loaded {
+    /// Its place in the scene.
+    pub number: u16,
     pub particles: Arc<Particles>,
     pub classes: RadiusClasses,
     pub visible: Vec<Visibility>,
@@ -27,7 +29,7 @@ impl Loaded {
     pub fn new(
         particles: Arc<Particles>,
         (scene, system): (&Scene, &System),
-        origin: DVec3,
+        (number, origin): (u16, DVec3),
         range: Option<[f64; 2]>,
     ) -> Result<Self> {
         let rule = radius::rule(&particles, system);
@@ -47,7 +49,7 @@ impl Loaded {
         };
         let visible = visibility(&particles, &classes, system)?;
         let paint = Paint::new(&particles, &system.color, range)?;
-        Ok(Self { particles, classes, visible, paint })
+        Ok(Self { number, particles, classes, visible, paint })
     }
 
     /// How many particles pass the filters.
@@ -59,8 +61,7 @@ impl Loaded {
     pub fn bounds(&self, origin: DVec3) -> Option<Bounds> {
         let boxes = self.classes.grids.iter().zip(&self.visible);
         let bounds = boxes.filter_map(|(grid, visible)| visible_bounds(grid, visible));
-        let (low, high) =
-            bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        let (low, high) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
         Some(Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin))
     }
 }
@@ -81,7 +82,10 @@ fn visibility(
         .collect::<Result<Vec<_>>>()?;
     let values: Vec<Box<dyn Fn(u32) -> f32 + Sync + '_>> = properties
         .iter()
-        .map(|p| Box::new(|i| p.value(particles, i as usize) as f32) as Box<dyn Fn(u32) -> f32 + Sync>)
+        .map(|p| {
+            Box::new(|i: u32| p.value(particles, i as usize) as f32)
+                as Box<dyn Fn(u32) -> f32 + Sync>
+        })
         .collect();
     let contains = |i: u32| selection.as_ref().is_none_or(|s| s.contains(i));
     let keep = selection.is_some().then_some(&contains as &(dyn Fn(u32) -> bool + Sync));

@@ -9,6 +9,7 @@
 mod column;
 mod demo;
 mod error;
+pub mod expression;
 mod particles;
 pub mod read;
 mod series;

@@ -12,14 +12,13 @@
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
 mod dump;
+mod elements;
 mod fields;
 mod forward;
 mod houdini;
 mod input;
 mod lanes;
 mod legacy_vtk;
-mod lines;
-mod elements;
 pub mod names;
 mod numpy;
 mod pdb;
