@@ -143,7 +143,7 @@ fn element(line: &[u8]) -> &'static str {
         return symbol;
     }
     let name = columns(line, 13, 16);
-    let letters = name.trim_ascii_start().trim_ascii_start();
+    let letters = name.trim_ascii_start();
     let letters = &letters[letters.iter().take_while(|b| b.is_ascii_digit()).count()..];
     let one = symbol(letters.get(..1).unwrap_or_default());
     let two = name.get(..2).filter(|two| two.iter().all(u8::is_ascii_alphabetic)).and_then(symbol);
