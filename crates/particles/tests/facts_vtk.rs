@@ -22,10 +22,14 @@ fn houdini_geometry_agrees_with_the_facts() {
 }
 
 /// Samples of the repository, and how many particles they hold.
-const SAMPLES: [(&str, usize); 5] = [
+const SAMPLES: [(&str, usize); 9] = [
     ("cube_8_particles.vtk", 8),
     ("para_test.vtk", 12),
     ("point_cloud.vtk", 3),
+    ("every_type_42_ascii.vtk", 3),
+    ("every_type_42_binary.vtk", 3),
+    ("every_type_51_ascii.vtk", 3),
+    ("every_type_51_binary.vtk", 3),
     ("scatter.bgeo", 25),
     ("test.geo", 5),
 ];
@@ -44,5 +48,35 @@ fn damage_is_an_error_at_worst() {
     for (name, _) in SAMPLES {
         let bytes = std::fs::read(common::own_data().join(name)).unwrap();
         common::damage(&bytes, 300, |bytes| common::read_damaged(&folder, name, bytes));
+    }
+}
+
+/// VTK wrote the same points with an array of every type, four ways.
+#[test]
+fn every_way_that_vtk_writes_reads_the_same() {
+    let read = |way| common::read(&common::own_data().join(format!("every_type_{way}.vtk")), 0);
+    let particles = read("51_ascii");
+    assert_eq!(particles.positions, [[0.5, 0.0, 0.0], [1.0, 2.25, -3.0], [-1.0, 0.125, 10.0]]);
+    assert_eq!((particles.time, particles.step), (Some(0.75), Some(12)));
+    assert_eq!(particles.columns.len(), 21);
+    for (name, row, expected) in [
+        ("a density", 2, -3.75),
+        ("Velocity", 2, 6.0),
+        ("char", 1, -2.0),
+        ("schar", 1, -2.0),
+        ("uchar", 2, 255.0),
+        ("short", 1, -300.0),
+        ("uint", 1, 4_294_967_295.0),
+        ("llong", 2, 1_099_511_627_776.0),
+        ("an id", 2, 6.0),
+        ("bit", 1, 0.0),
+        ("GlobalIds", 2, 12.0),
+        ("label", 1, 2.0),
+    ] {
+        let found = particles.column(name).map(|column| column.number(row, 0));
+        assert_eq!(found, Some(expected), "{name}");
+    }
+    for way in ["42_ascii", "42_binary", "51_binary"] {
+        assert_eq!(read(way), particles, "{way}");
     }
 }

@@ -257,7 +257,12 @@ impl<'a> Cursor<'a> {
             Type::Bit | Type::U8 => {
                 Values::U8(self.numbers(count, |word| u8::try_from(whole(word)?).ok())?)
             }
-            Type::I8 | Type::I16 | Type::U16 | Type::I32 => {
+            // VTK writes a negative char as the byte it is.
+            Type::I8 => Values::I32(self.numbers(count, |word| match whole(word)? {
+                byte @ -128..=255 => Some(i32::from(byte as i8)),
+                _ => None,
+            })?),
+            Type::I16 | Type::U16 | Type::I32 => {
                 Values::I32(self.numbers(count, |word| i32::try_from(whole(word)?).ok())?)
             }
             _ => Values::I64(self.numbers(count, whole)?),
