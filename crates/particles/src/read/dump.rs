@@ -84,7 +84,7 @@ impl Layout for Frame {
             begun = true;
             // The last line of the file may be cut; only an empty frame can end with its names.
             let names = item.strip_prefix("ATOMS");
-            if !line.ended && !(names.is_some() && atoms == Some(0)) {
+            if !line.ended && (names.is_none() || atoms != Some(0)) {
                 return Err(Stop::Cut(lines.cut("the lines of the item")));
             }
             if let Some(names) = names {
