@@ -21,7 +21,6 @@ pub enum Ink {
 pub(crate) enum Align {
     Left,
     Center,
-    Right,
 }
 
 /// A frame's colours with all that drawing needs to know.
@@ -97,7 +96,6 @@ impl<'a> Canvas<'a> {
         let left = match align {
             Align::Left => at[0],
             Align::Center => at[0] - text.width / 2.0,
-            Align::Right => at[0] - text.width,
         };
         let mut shape = text.coverage([left, at[1]], self.halo(), self.size());
         self.halo_of(&shape);
@@ -141,13 +139,17 @@ impl<'a> Canvas<'a> {
         }
         let index = y * self.frame.width() + x;
         let Some(pixel) = self.frame.color_mut().get_mut(index) else { return };
-        // `max` first, so that NaN becomes nothing.
-        let alpha = pixel[3].max(0.0).min(1.0);
+        let alpha = clipped(pixel[3], 1.0);
         for (under, over) in pixel.iter_mut().zip(color) {
-            *under = over * opacity + under.max(0.0).min(alpha) * (1.0 - opacity);
+            *under = over * opacity + clipped(*under, alpha) * (1.0 - opacity);
         }
         pixel[3] = opacity + alpha * (1.0 - opacity);
     }
+}
+
+/// `value` between 0 and `most`; NaN becomes 0, because `max` takes the number.
+fn clipped(value: f32, most: f32) -> f32 {
+    value.max(0.0).min(most)
 }
 
 /// Mean brightness to the eye (sRGB luma, 0 … 1) of the picture's outer eighth, over white paper.
