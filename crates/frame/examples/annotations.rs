@@ -36,7 +36,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn background(style: Option<&str>) -> Background {
     match style {
-        Some("dark") => Background::Gradient { top: [0.005, 0.008, 0.02], bottom: [0.06, 0.07, 0.1] },
+        Some("dark") => {
+            Background::Gradient { top: [0.005, 0.008, 0.02], bottom: [0.06, 0.07, 0.1] }
+        }
         _ => Background::Solid([1.0; 3]),
     }
 }

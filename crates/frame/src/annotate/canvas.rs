@@ -34,10 +34,10 @@ pub(crate) struct Canvas<'a> {
     pub(crate) em: f32,
 }
 
-const DARK: f32 = 0.09;
-const LIGHT: f32 = 0.97;
-/// Opacity of the halo: enough to part text from particles, too little to be seen as a box.
-const HALO: f32 = 0.7;
+/// Opacity of the halo: enough to part text from particles, too little to be seen as a box. Dark needs more, because
+/// light shines through it.
+const LIGHT_HALO: f32 = 0.7;
+const DARK_HALO: f32 = 0.85;
 
 impl<'a> Canvas<'a> {
     pub(crate) fn new(frame: &'a mut Frame, ink: Ink) -> Canvas<'a> {
@@ -47,7 +47,8 @@ impl<'a> Canvas<'a> {
             Ink::Light => false,
         };
         let grey = |level: f32| [linear_from_srgb(level); 3];
-        let (ink, paper) = if dark { (grey(DARK), grey(LIGHT)) } else { (grey(LIGHT), grey(DARK)) };
+        // White paper is the page's own white, or the halo would show on it.
+        let (ink, paper) = if dark { (grey(0.09), grey(1.0)) } else { (grey(0.97), grey(0.06)) };
         // 480 rows get 13 pixels, 1080 get 27, 2160 get 54; a tall narrow picture counts as wide as 4:5.
         let side = (frame.height() as f32).min(frame.width() as f32 * 0.8);
         let em = (0.025 * side).max((0.1 * side).min(12.5));
@@ -108,7 +109,8 @@ impl<'a> Canvas<'a> {
 
     /// The faint surround that parts a shape from what is behind it.
     pub(crate) fn halo_of(&mut self, shape: &Coverage) {
-        self.fill(&shape.grown(self.halo()), self.paper, HALO);
+        let opacity = if self.paper[0] > self.ink[0] { LIGHT_HALO } else { DARK_HALO };
+        self.fill(&shape.grown(self.halo()), self.paper, opacity);
     }
 
     /// Paints a shape.
