@@ -408,3 +408,41 @@ fn blocks_do_not_show_in_the_result() {
     };
     assert_eq!(names[..], ["H", "He", "Xe"]);
 }
+
+#[test]
+fn columns_called_like_positions_or_radii_do_no_harm() {
+    let p = first(
+        "p.csv",
+        "x,y,z,Points:0,Points:1,Points:2,Radius:0,Radius:1,Radius:2,Position\n1,2,3,4,5,6,7,8,9,0\n",
+    );
+    assert_eq!(
+        (p.positions.as_slice(), &p.radius),
+        ([[1.0, 2.0, 3.0]].as_slice(), &Radius::Unknown)
+    );
+    assert_eq!((p.columns.len(), reals(&p, "Points:2")), (7, vec![6.0]));
+    let p = first("q.xyz", "1\nProperties=Position:R:2:pos:R:3:Radius:R:3\n8 9 1 2 3 4 5 6\n");
+    assert_eq!(
+        (p.positions.as_slice(), &p.radius),
+        ([[1.0, 2.0, 3.0]].as_slice(), &Radius::Unknown)
+    );
+    assert_eq!(reals(&p, "radius"), [4.0, 5.0, 6.0]);
+}
+
+#[test]
+fn other_text_formats_are_not_claimed() {
+    let texts = [
+        "Water\n    2\n    1SOL     OW    1   0.1   0.2   0.3\n    1SOL    HW1    2   0.1   0.2   0.4\n 1 1 1\n",
+        "ATOM      1  N   MET A   1      27.340  24.430   2.614  1.00  9.67           N\nEND\n",
+        "MnO\n1.0\n4 0 0\n0 4 0\n0 0 4\nMn O\n1 1\nDirect\n0 0 0\n.5 .5 .5\n",
+        "#F A 1 1 0 3 0 0\n#C number type x y z\n#X 9 0 0\n#E\n0 1 2 3 4\n1 1 2 3 5\n",
+        "LAMMPS data file\n\n2 atoms\n1 atom types\n0 1 xlo xhi\n\nAtoms\n\n1 1 0 0 0\n2 1 0 0 1\n",
+    ];
+    for (i, text) in texts.iter().enumerate() {
+        if let Ok((format, _)) = reading::open(&file(&format!("other{i}"), text.as_bytes())) {
+            assert!(
+                !["text table", "XYZ", "LAMMPS dump"].contains(&format),
+                "{i} is called {format}"
+            );
+        }
+    }
+}

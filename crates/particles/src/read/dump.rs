@@ -82,44 +82,26 @@ impl Layout for Frame {
                 return Err(if cut { Stop::Cut(error) } else { Stop::Error(error) });
             };
             begun = true;
-            if let Some(names) = item.strip_prefix("ATOMS") {
-                if !line.ended {
-                    // The line of names may be cut.
-                    if atoms != Some(0) {
-                        return Err(Stop::Cut(lines.cut("the lines of the atoms")));
-                    }
-                }
+            // The last line of the file may be cut; only an empty frame can end with its names.
+            let names = item.strip_prefix("ATOMS");
+            if !line.ended && (names.is_none() || atoms != Some(0)) {
+                return Err(Stop::Cut(lines.cut("the lines of the item")));
+            }
+            if let Some(names) = names {
                 header.atoms = atoms.ok_or_else(|| {
                     lines.error(line.number, "expected ITEM: NUMBER OF ATOMS before ITEM: ATOMS")
                 })?;
-                if names.split_ascii_whitespace().count() > rows::MOST_COLUMNS {
-                    let message =
-                        format!("expected at most {} columns, found more", rows::MOST_COLUMNS);
-                    return Err(Stop::Error(lines.error(line.number, message)));
-                }
                 let first = if header.atoms > 0 { lines.peek()? } else { None };
                 header.columns = columns(names, first.as_ref().map(|l| l.text.as_str()));
                 check_columns(&header, lines, line.number)?;
                 return Ok(Some(header));
             }
             match item {
-                "TIMESTEP" => header.step = Some(value(lines, "a time step", text::integer)?),
-                "TIME" => header.time = Some(value(lines, "a time", text::real)?),
-                "UNITS" => drop(next(lines, "a system of units")?),
                 "NUMBER OF ATOMS" => {
                     let count = |t: &[u8]| text::integer(t).and_then(|n| u64::try_from(n).ok());
                     atoms = Some(value(lines, "the number of atoms", count)?);
                 }
-                _ if item.starts_with("BOX BOUNDS") => {
-                    header.sim_box = Some(read_box(lines, item)?)
-                }
-                _ => {
-                    let message = format!(
-                        "expected an item of a dump of atoms, found {}",
-                        text::shown(text.as_bytes())
-                    );
-                    return Err(Stop::Error(lines.error(line.number, message)));
-                }
+                _ => header.item(item, &line, lines)?,
             }
         }
     }
@@ -147,6 +129,29 @@ impl Layout for Frame {
         particles.time = header.time;
         particles.step = header.step;
         Ok(particles)
+    }
+}
+
+impl Header {
+    /// Reads the lines of an item that says something about the frame.
+    fn item(
+        &mut self,
+        item: &str,
+        line: &text::Line,
+        lines: &mut Lines,
+    ) -> std::result::Result<(), Stop> {
+        match item {
+            "TIMESTEP" => self.step = Some(value(lines, "a time step", text::integer)?),
+            "TIME" => self.time = Some(value(lines, "a time", text::real)?),
+            "UNITS" => drop(next(lines, "a system of units")?),
+            _ if item.starts_with("BOX BOUNDS") => self.sim_box = Some(read_box(lines, item)?),
+            _ => {
+                let found = text::shown(line.text.trim().as_bytes());
+                let message = format!("expected an item of a dump of atoms, found {found}");
+                return Err(Stop::Error(lines.error(line.number, message)));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -228,7 +233,9 @@ const COORDINATES: [([&str; 3], bool); 4] = [
 ];
 
 fn columns(names: &str, first_row: Option<&str>) -> Columns {
-    let mut words: Vec<&str> = names.split_ascii_whitespace().collect();
+    // One too many is refused in `check_columns`.
+    let mut words: Vec<&str> =
+        names.split_ascii_whitespace().take(rows::MOST_COLUMNS + 1).collect();
     if words.is_empty() {
         words = vec!["id", "type", "xs", "ys", "zs"];
     }
@@ -306,6 +313,10 @@ fn add_column(
 
 fn check_columns(header: &Header, lines: &Lines, line: u64) -> Result<()> {
     let columns = &header.columns;
+    if columns.schema.fields.len() > rows::MOST_COLUMNS {
+        let message = format!("expected at most {} columns, found more", rows::MOST_COLUMNS);
+        return Err(lines.error(line, message));
+    }
     if !columns.present.contains(&true) {
         return Err(lines.error(
             line,

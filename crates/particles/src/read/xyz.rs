@@ -293,7 +293,10 @@ fn declared_schema(properties: &str) -> std::result::Result<(Schema, bool), Stri
                 ));
             }
         };
-        let own = rows::free_name(&schema.groups, if fitting { standard } else { name }, name);
+        // A vector called `Radius` must not be taken for radii.
+        let fallback = name.to_ascii_lowercase();
+        let wish = if fitting { standard } else { &fallback };
+        let own = rows::free_name(&schema.groups, wish, name);
         let group = schema.groups.len();
         schema.groups.push(Group { name: own, components, kind });
         schema.fields.extend((0..components).map(|c| Some((group, c))));

@@ -239,21 +239,21 @@ fn vectors(
         .collect();
     let complete = |vector: &str| {
         let components: Vec<_> =
-            candidates.iter().flatten().filter(|(v, ..)| v == vector).map(|(_, c, _)| *c).collect();
+            candidates.iter().flatten().filter(|(v, _)| v == vector).map(|(_, c)| *c).collect();
         let size = components.len();
         (matches!(size, 3 | 4 | 6 | 9) && (0..size).all(|c| components.contains(&c)))
             .then_some(size)
     };
-    let joined = |(name, component, _): &(String, usize, String)| {
+    let joined = |(name, component): &(String, usize)| {
         complete(name).map(|size| (name.clone(), *component, size))
     };
     candidates.iter().map(|candidate| candidate.as_ref().and_then(joined)).collect()
 }
 
-/// The vector that a column may belong to, its component, and its own name.
-fn vector_of(name: &str) -> Option<(String, usize, String)> {
+/// The vector that a column may belong to, and its component.
+fn vector_of(name: &str) -> Option<(String, usize)> {
     if let Some((standard, component, _)) = names::component(&bare(name)) {
-        return Some((standard.to_owned(), component, name.to_owned()));
+        return Some((standard.to_owned(), component));
     }
     let (stem, component, parted) = split_component(name)?;
     if !parted || stem.is_empty() || stem == "geo" {
@@ -264,6 +264,10 @@ fn vector_of(name: &str) -> Option<(String, usize, String)> {
         "f" => Some(names::FORCE),
         stem => names::standard(stem),
     };
+    // A second set of coordinates, or a vector called like a scalar, stays in single columns.
+    if standard.is_some_and(|s| s == names::POSITION || SCALARS.contains(&s)) {
+        return None;
+    }
     let own = name.get(..stem.len()).filter(|own| own.eq_ignore_ascii_case(&stem));
-    Some((standard.unwrap_or(own.unwrap_or(&stem)).to_owned(), component, name.to_owned()))
+    Some((standard.unwrap_or(own.unwrap_or(&stem)).to_owned(), component))
 }

@@ -33,6 +33,13 @@ impl Layout {
     /// # Errors
     /// None fits; the error is that of the separator that got farthest.
     pub(super) fn guess(head: &Head<'_>) -> Result<Self, Wrong> {
+        // IMD configurations are tables but for a header of their own, which says what a column means.
+        if head.bytes.starts_with(b"#F ") {
+            return Err((
+                1,
+                "expected a table, found the header of an IMD configuration".to_owned(),
+            ));
+        }
         let mut comments = Vec::new();
         let mut content: Vec<Numbered> = Vec::new();
         for (i, line) in head.lines().enumerate() {
