@@ -61,6 +61,30 @@ struct Expression {
     text: String,
     tightness: u8,
     value: Box<dyn Fn(&Particles, usize) -> f64>,
+    kind: Kind,
+}
+
+/// What decides whether a number is rounded for a comparison.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// The same for all rows.
+    Constant,
+    /// A property in single precision about this origin.
+    Single(f64),
+    Other,
+}
+
+impl Expression {
+    fn kind(self, kind: Kind) -> Self {
+        Self { kind, ..self }
+    }
+}
+
+/// `value`, rounded if it is a constant compared with `other` in single precision.
+fn rounded(value: f64, kind: Kind, other: Kind) -> f64 {
+    let (Kind::Constant, Kind::Single(origin)) = (kind, other) else { return value };
+    let single = (value - origin) as f32;
+    if single.is_normal() { origin + f64::from(single) } else { value }
 }
 
 const ATOM: u8 = 9;
@@ -70,7 +94,7 @@ fn of(
     tightness: u8,
     value: impl Fn(&Particles, usize) -> f64 + 'static,
 ) -> Expression {
-    Expression { text, tightness, value: Box::new(value) }
+    Expression { text, tightness, value: Box::new(value), kind: Kind::Other }
 }
 
 fn flag(condition: bool) -> f64 {
@@ -86,10 +110,11 @@ fn property(random: &mut Random) -> Expression {
         of(text.into(), ATOM, move |p: &Particles, row| p.columns[index].number(row, component))
     };
     match random.below(12) {
-        0 => column("Mass", 0, 0),
+        0 => column("Mass", 0, 0).kind(Kind::Single(0.0)),
         1 => column("`Velocity`.Y", 1, 1),
         2 => column("velocity[2]", 1, 2),
-        3 => column("Particle Type", 2, 0),
+        // A name is its code only beside a number, and two properties may meet here.
+        3 => of("Particle Type * 1".into(), 6, |p, row| p.columns[2].number(row, 0)),
         4 => column("charge", 3, 0),
         5 => column("id", 4, 0),
         6 => column("flags[1]", 5, 1),
@@ -98,8 +123,10 @@ fn property(random: &mut Random) -> Expression {
         9 => of("Radius".into(), ATOM, |p, row| match &p.radius {
             Radius::Each(radii) => f64::from(radii[row]),
             _ => f64::NAN,
-        }),
-        10 => of("Position.Z".into(), ATOM, |p, row| p.origin[2] + f64::from(p.positions[row][2])),
+        })
+        .kind(Kind::Single(0.0)),
+        10 => of("Position.Z".into(), ATOM, |p, row| p.origin[2] + f64::from(p.positions[row][2]))
+            .kind(Kind::Single(-3.0)),
         _ => {
             let name = ["O", "H", "C", "Xe"][random.below(4)];
             let equal = random.below(2) == 0;
@@ -157,44 +184,57 @@ fn expression(random: &mut Random, depth: usize) -> Expression {
             return property(random);
         }
         let number = random.quarter().abs();
-        return of(format!("{number}"), ATOM, move |_, _| number);
+        return of(format!("{number}"), ATOM, move |_, _| number).kind(Kind::Constant);
     }
     let depth = depth - 1 - random.below(depth);
     let left = expression(random, depth);
+    let constant = if left.kind == Kind::Constant { Kind::Constant } else { Kind::Other };
     match random.below(10) {
         0 => {
             let (name, function) = FUNCTIONS[random.below(FUNCTIONS.len())];
             of(format!("{name}({})", left.text), ATOM, move |p, row| function((left.value)(p, row)))
+                .kind(constant)
         }
         1 => {
             let word = ["!", "not "][random.below(2)];
             let text = format!("{word}{}", within(&left, 3, random));
-            of(text, 3, move |p, row| flag(!truth((left.value)(p, row))))
+            of(text, 3, move |p, row| flag(!truth((left.value)(p, row)))).kind(constant)
         }
         2 => {
             let text = format!("-{}", within(&left, 7, random));
-            of(text, 7, move |p, row| -(left.value)(p, row))
-        }
-        3 => {
-            let right = expression(random, depth);
-            let text = format!("min({}, {})", left.text, right.text);
-            of(text, ATOM, move |p, row| (left.value)(p, row).min((right.value)(p, row)))
+            of(text, 7, move |p, row| -(left.value)(p, row)).kind(constant)
         }
         _ => {
             let right = expression(random, depth);
-            let (signs, level, operation) = OPERATIONS[random.below(OPERATIONS.len())];
-            // Comparisons do not chain, powers go from the right, all others from the left.
-            let (on_left, on_right) = match level {
-                4 => (5, 5),
-                8 => (9, 7),
-                level => (level, level + 1),
-            };
-            let sign = signs[random.below(signs.len())];
-            let left_text = within(&left, on_left, random);
-            let text = format!("{left_text} {sign} {}", within(&right, on_right, random));
-            of(text, level, move |p, row| operation((left.value)(p, row), (right.value)(p, row)))
+            let kind = if right.kind == Kind::Constant { constant } else { Kind::Other };
+            pair(left, right, random).kind(kind)
         }
     }
+}
+
+/// Two expressions under an operator or a function.
+fn pair(left: Expression, right: Expression, random: &mut Random) -> Expression {
+    if random.below(8) == 0 {
+        let text = format!("min({}, {})", left.text, right.text);
+        return of(text, ATOM, move |p, row| (left.value)(p, row).min((right.value)(p, row)));
+    }
+    let (signs, level, operation) = OPERATIONS[random.below(OPERATIONS.len())];
+    // Comparisons do not chain, powers go from the right, all others from the left.
+    let (on_left, on_right) = match level {
+        4 => (5, 5),
+        8 => (9, 7),
+        level => (level, level + 1),
+    };
+    let sign = signs[random.below(signs.len())];
+    let left_text = within(&left, on_left, random);
+    let text = format!("{left_text} {sign} {}", within(&right, on_right, random));
+    of(text, level, move |p, row| {
+        let (a, b) = ((left.value)(p, row), (right.value)(p, row));
+        match level {
+            4 => operation(rounded(a, left.kind, right.kind), rounded(b, right.kind, left.kind)),
+            _ => operation(a, b),
+        }
+    })
 }
 
 #[test]
