@@ -31,7 +31,8 @@ impl ExpressionError {
         let excerpt = text.chars().skip(first).take(before - first + width + SHOWN).map(plain);
         Self {
             column: before + 1,
-            message: message.into(),
+            // One line, whatever stood there.
+            message: message.into().chars().map(plain).collect(),
             excerpt: excerpt.collect(),
             carets: (before - first, width),
         }
