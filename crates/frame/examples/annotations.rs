@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let size = [number(1, 1280)?, number(2, 960)?];
     let style = arguments.get(3).map(String::as_str);
 
-    let camera = Camera::new([11.0, -14.5, 9.0], size);
+    let camera = Camera::new([14.0, -20.0, 13.0], size);
     let mut frame = spheres(&camera)?;
     background(style).put_behind(&mut frame);
     annotations(&camera, style).draw(&mut frame);

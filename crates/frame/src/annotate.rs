@@ -52,6 +52,9 @@ impl Annotations {
     ///
     /// It belongs after tone and background: what it touches is clipped to what a screen can show.
     pub fn draw(&self, frame: &mut Frame) {
+        if frame.color().is_empty() {
+            return;
+        }
         let mut canvas = Canvas::new(frame, self.ink);
         if let Some(lines) = &self.lines {
             lines.draw(&mut canvas);

@@ -9,11 +9,18 @@
 use std::io::{Seek, Write};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Vec2,
-    WritableImage,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
+    LayerAttributes, LineOrder, Vec2, WritableImage,
 };
 
 use crate::{Frame, FrameError, Result, Values};
+
+/// Lossless, line by line from the top, so that equal frames have equal bytes.
+const ENCODING: Encoding = Encoding {
+    compression: Compression::ZIP1,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
 
 /// Writes colour and all layers as a multi-part OpenEXR file.
 ///
@@ -29,7 +36,7 @@ pub fn write_exr(frame: &Frame, out: impl Write + Seek) -> Result<()> {
         Layer::new(
             Vec2(width, height),
             LayerAttributes::named(name),
-            Encoding::SMALL_FAST_LOSSLESS,
+            ENCODING,
             AnyChannels::sort(channels(name, values).into()),
         )
     });

@@ -3,7 +3,8 @@
 use std::io::{Cursor, Write};
 
 use png::{
-    BitDepth, ColorType, Compression, Decoder, Encoder, SrgbRenderingIntent, Transformations,
+    BitDepth, ColorType, Compression, Decoder, Encoder, Filter, SrgbRenderingIntent,
+    Transformations,
 };
 
 use crate::{Frame, FrameError, Result, Rgba8, srgb};
@@ -51,6 +52,8 @@ pub fn write_png(frame: &Frame, options: PngOptions<'_>, out: impl Write) -> Res
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     encoder.set_compression(Compression::Fast);
+    // Three times as fast as trying all filters, and as small for shaded pictures.
+    encoder.set_filter(Filter::Paeth);
     if let Some(scene) = options.scene {
         encoder.add_itxt_chunk(SCENE_KEYWORD.into(), scene.into()).map_err(&failed)?;
     }

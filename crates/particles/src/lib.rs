@@ -2,7 +2,8 @@
 //!
 //! [`Particles`] is one frame: positions, radii, any number of named [`Column`]s, and the simulation
 //! box. [`Series`] gives frames on demand from a *source*: a file, a quoted pattern of files, or a
-//! deterministic `demo:` set. Files are read by the formats of [`read`].
+//! deterministic `demo:` set. Files are read by the formats of [`read`]. [`select`] finds the particles
+//! for which an expression holds.
 //!
 //! Invariant: nothing here knows a camera, a scene or a picture.
 
@@ -18,6 +19,7 @@ mod source;
 
 pub use column::{Column, Values};
 pub use error::{Place, ReadError, Result};
+pub use expression::{ExpressionError, Selection, properties, select};
 pub use particles::{Particles, PositionBuilder, Radius};
 pub use series::Series;
 pub use sim_box::SimulationBox;

@@ -19,6 +19,8 @@ const COLORS: [[f32; 3]; 3] = [[0.73, 0.045, 0.04], [0.035, 0.36, 0.06], [0.04, 
 const NAMES: [&str; 3] = ["x", "y", "z"];
 /// Length of an arrow in ems.
 const LENGTH: f32 = 2.6;
+/// From the tip to the middle of the letter in ems.
+const GAP: f32 = 0.62;
 
 impl Axes {
     /// Draws the arrows, the farthest first, and returns the side of the square they take.
@@ -33,45 +35,52 @@ impl Axes {
         };
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| self.directions[a][2].total_cmp(&self.directions[b][2]));
-        for axis in order {
-            draw_arrow(canvas, [x, y], self.directions[axis], axis);
+        let arrows = order.map(|axis| (axis, arrow(canvas, [x, y], self.directions[axis])));
+        // All halos lie below all arrows, or they would part the arrows at their root.
+        arrows.iter().for_each(|(_, shape)| canvas.halo_of(shape));
+        for (axis, shape) in &arrows {
+            // Towards a light ink the colours move too, because deep blue drowns in black.
+            let light = 0.15 * canvas.ink[0];
+            let color = COLORS[*axis].map(|c| c + (1.0 - c) * light);
+            canvas.fill(shape, color, 1.0);
+            let letter = Text::new(NAMES[*axis], em, f32::INFINITY);
+            let at = beyond_tip([x, y], self.directions[*axis], em);
+            canvas.text_in(&letter, at, Align::Center, color);
         }
         2.0 * reach
     }
 }
 
-fn draw_arrow(canvas: &mut Canvas<'_>, from: Point, direction: [f32; 3], axis: usize) {
+/// Where a letter's foot stands beyond the tip of an arrow; beside it, if the arrow points at the eye.
+fn beyond_tip(from: Point, [right, up, _]: [f32; 3], em: f32) -> Point {
+    let length = right.hypot(up);
+    let [dx, dy] = if length > 0.05 { [right / length, up / length] } else { [0.7, 0.7] };
+    let tip = tip(from, [right, up], em);
+    let x_height = 0.547 * em;
+    [tip[0] + dx * GAP * em, tip[1] - dy * GAP * em + x_height / 2.0]
+}
+
+fn tip(from: Point, [right, up]: [f32; 2], em: f32) -> Point {
+    let [right, up] = [right, up].map(|c| c.clamp(-1.0, 1.0) * LENGTH * em);
+    [from[0] + right, from[1] - up]
+}
+
+/// A shaft and a head; both shrink with an arrow that points at the eye, down to a dot.
+fn arrow(canvas: &Canvas<'_>, from: Point, [right, up, _]: [f32; 3]) -> Coverage {
     let em = canvas.em;
-    let [right, up, _] = direction.map(|c| c.clamp(-1.0, 1.0));
-    let tip = [from[0] + right * LENGTH * em, from[1] - up * LENGTH * em];
+    let tip = tip(from, [right, up], em);
     let mut shape = canvas.shape([
         from[0].min(tip[0]) - em,
         from[1].min(tip[1]) - em,
         from[0].max(tip[0]) + em,
         from[1].max(tip[1]) + em,
     ]);
-    arrow(&mut shape, [from, tip], em);
-    canvas.halo_of(&shape);
-    canvas.fill(&shape, COLORS[axis], 1.0);
-
-    // A letter stands beyond its tip; beside it, if the arrow points at the eye.
-    let length = right.hypot(up);
-    let [dx, dy] = if length > 0.05 { [right / length, up / length] } else { [0.7, 0.7] };
-    let gap = 0.62 * em;
-    let x_height = 0.547 * em;
-    let letter = Text::new(NAMES[axis], em, f32::INFINITY);
-    let at = [tip[0] + dx * gap, tip[1] - dy * gap + x_height / 2.0];
-    canvas.text_in(&letter, at, Align::Center, COLORS[axis]);
-}
-
-/// A shaft and a head; both shrink with an arrow that points at the eye, down to a dot.
-fn arrow(shape: &mut Coverage, [from, tip]: [Point; 2], em: f32) {
     let [dx, dy] = [tip[0] - from[0], tip[1] - from[1]];
     let length = dx.hypot(dy);
     let width = 0.19 * em;
-    shape.disc(from, width);
     if length < 0.05 * em {
-        return;
+        shape.disc(tip, 0.27 * em);
+        return shape;
     }
     let [ux, uy] = [dx / length, dy / length];
     let head = (0.75 * em).min(length);
@@ -80,4 +89,5 @@ fn arrow(shape: &mut Coverage, [from, tip]: [Point; 2], em: f32) {
     shape.line(from, neck, width);
     let corner = |side: f32| [neck[0] - uy * half * side, neck[1] + ux * half * side];
     shape.triangle([tip, corner(1.0), corner(-1.0)]);
+    shape
 }

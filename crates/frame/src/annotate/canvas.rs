@@ -21,7 +21,6 @@ pub enum Ink {
 pub(crate) enum Align {
     Left,
     Center,
-    Right,
 }
 
 /// A frame's colours with all that drawing needs to know.
@@ -35,10 +34,10 @@ pub(crate) struct Canvas<'a> {
     pub(crate) em: f32,
 }
 
-const DARK: f32 = 0.09;
-const LIGHT: f32 = 0.97;
-/// Opacity of the halo: enough to part text from particles, too little to be seen as a box.
-const HALO: f32 = 0.7;
+/// Opacity of the halo: enough to part text from particles, too little to be seen as a box. Dark needs more, because
+/// light shines through it.
+const LIGHT_HALO: f32 = 0.7;
+const DARK_HALO: f32 = 0.85;
 
 impl<'a> Canvas<'a> {
     pub(crate) fn new(frame: &'a mut Frame, ink: Ink) -> Canvas<'a> {
@@ -48,7 +47,8 @@ impl<'a> Canvas<'a> {
             Ink::Light => false,
         };
         let grey = |level: f32| [linear_from_srgb(level); 3];
-        let (ink, paper) = if dark { (grey(DARK), grey(LIGHT)) } else { (grey(LIGHT), grey(DARK)) };
+        // White paper is the page's own white, or the halo would show on it.
+        let (ink, paper) = if dark { (grey(0.09), grey(1.0)) } else { (grey(0.97), grey(0.06)) };
         // 480 rows get 13 pixels, 1080 get 27, 2160 get 54; a tall narrow picture counts as wide as 4:5.
         let side = (frame.height() as f32).min(frame.width() as f32 * 0.8);
         let em = (0.025 * side).max((0.1 * side).min(12.5));
@@ -97,7 +97,6 @@ impl<'a> Canvas<'a> {
         let left = match align {
             Align::Left => at[0],
             Align::Center => at[0] - text.width / 2.0,
-            Align::Right => at[0] - text.width,
         };
         let mut shape = text.coverage([left, at[1]], self.halo(), self.size());
         self.halo_of(&shape);
@@ -110,7 +109,8 @@ impl<'a> Canvas<'a> {
 
     /// The faint surround that parts a shape from what is behind it.
     pub(crate) fn halo_of(&mut self, shape: &Coverage) {
-        self.fill(&shape.grown(self.halo()), self.paper, HALO);
+        let opacity = if self.paper[0] > self.ink[0] { LIGHT_HALO } else { DARK_HALO };
+        self.fill(&shape.grown(self.halo()), self.paper, opacity);
     }
 
     /// Paints a shape.
@@ -141,13 +141,17 @@ impl<'a> Canvas<'a> {
         }
         let index = y * self.frame.width() + x;
         let Some(pixel) = self.frame.color_mut().get_mut(index) else { return };
-        // `max` first, so that NaN becomes nothing.
-        let alpha = pixel[3].max(0.0).min(1.0);
+        let alpha = clipped(pixel[3], 1.0);
         for (under, over) in pixel.iter_mut().zip(color) {
-            *under = over * opacity + under.max(0.0).min(alpha) * (1.0 - opacity);
+            *under = over * opacity + clipped(*under, alpha) * (1.0 - opacity);
         }
         pixel[3] = opacity + alpha * (1.0 - opacity);
     }
+}
+
+/// `value` between 0 and `most`; NaN becomes 0, because `max` takes the number.
+fn clipped(value: f32, most: f32) -> f32 {
+    value.max(0.0).min(most)
 }
 
 /// Mean brightness to the eye (sRGB luma, 0 … 1) of the picture's outer eighth, over white paper.

@@ -1,6 +1,7 @@
 //! What the colours mean: a bar with ticks, or a list of names.
 
 use super::canvas::{Align, Canvas};
+use super::coverage::Bounds;
 use super::text::{CAP_HEIGHT, Text};
 use crate::ticks::ticks;
 
@@ -76,7 +77,7 @@ impl Legend {
         if colors.is_empty() || height < 2.0 * em {
             return;
         }
-        let most = (height / (2.6 * em)) as usize + 1;
+        let most = (height / (2.6 * em)).clamp(1.0, 20.0) as usize + 1;
         let ticks = ticks(range[0], range[1], most);
         let labels: Vec<Text> =
             ticks.labels.iter().map(|l| Text::new(l, small, room.width)).collect();
@@ -86,21 +87,24 @@ impl Legend {
         let gap = 0.65 * em;
         let widest = labels.iter().map(|label| label.width).fold(0.0, f32::max);
         let beside = multiplier.as_ref().map_or(0.0, |m| m.width - 0.95 * em).max(widest + gap);
-        // The title sets the left edge, unless the bar and its labels need more.
-        let left = (room.right - (beside + 0.95 * em).max(title.width)).round();
+        let left = (room.right - (0.95 * em + beside)).round();
         let above = if multiplier.is_some() { 2.9 * em } else { 1.6 * em };
         let top = ((room.top + room.bottom + above - height) / 2.0).round().max(room.top + above);
         let bar = [left, top, left + (0.95 * em).round(), (top + height).round()];
 
-        canvas.text(&title, [left, top - above + CAP_HEIGHT * em], Align::Left);
+        // A long title reaches over the bar to the left, so that the bar stays at the rim.
+        let title_left = left.min(room.right - title.width);
+        canvas.text(&title, [title_left, top - above + CAP_HEIGHT * em], Align::Left);
         if let Some(multiplier) = &multiplier {
             canvas.text(multiplier, [left, top - 0.6 * em], Align::Left);
         }
-        draw_bar(canvas, bar, colors);
-        for (value, label) in ticks.values.iter().zip(&labels) {
-            let share = if range[0] == range[1] { 0.5 } else { share_of(*value, range) };
-            let y = bar[3] - share * (bar[3] - bar[1]);
-            draw_tick(canvas, [bar[2], y]);
+        let height_of = |value: f64| {
+            let share = if range[0] == range[1] { 0.5 } else { share_of(value, range) };
+            bar[3] - share * (bar[3] - bar[1])
+        };
+        let heights: Vec<f32> = ticks.values.iter().map(|value| height_of(*value)).collect();
+        draw_bar(canvas, bar, &heights, colors);
+        for (y, label) in heights.iter().zip(&labels) {
             let baseline = y + CAP_HEIGHT * small / 2.0;
             canvas.text(label, [bar[2] + gap, baseline], Align::Left);
         }
@@ -143,13 +147,19 @@ fn share_of(value: f64, [from, to]: [f64; 2]) -> f32 {
     ((value / 2.0 - from / 2.0) / (to / 2.0 - from / 2.0)).clamp(0.0, 1.0) as f32
 }
 
-/// The colours from the bottom to the top, in a thin frame.
-fn draw_bar(canvas: &mut Canvas<'_>, bar: [f32; 4], colors: &[[f32; 3]]) {
+/// The colours from the bottom to the top, in a thin frame with ticks at the given `heights`.
+fn draw_bar(canvas: &mut Canvas<'_>, bar: Bounds, heights: &[f32], colors: &[[f32; 3]]) {
     let [left, top, right, bottom] = bar;
-    let edge = canvas.stroke();
-    let frame = [left - edge, top - edge, right + edge, bottom + edge];
-    let mut shape = canvas.shape(frame);
+    let stroke = canvas.stroke();
+    let tick_end = right + stroke + 0.3 * canvas.em;
+    let frame = [left - stroke, top - stroke, right + stroke, bottom + stroke];
+    let mut shape = canvas.shape([frame[0], frame[1], tick_end, frame[3]]);
     shape.rectangle(frame);
+    for y in heights {
+        // On whole pixels, or it would be twice as wide and half as dark.
+        let y = (y - stroke / 2.0).round();
+        shape.rectangle([right, y, tick_end, y + stroke]);
+    }
     canvas.halo_of(&shape);
     canvas.fill(&shape, canvas.ink, 1.0);
     let mut shape = canvas.shape(bar);
@@ -168,18 +178,6 @@ fn color_at(share: f32, colors: &[[f32; 3]]) -> [f32; 3] {
     let at = |i: usize| colors.get(i.min(last)).copied().unwrap_or_default();
     let (from, to) = (at(below), at(below + 1));
     std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
-}
-
-/// A short stroke to the right of `at`.
-fn draw_tick(canvas: &mut Canvas<'_>, at: [f32; 2]) {
-    let stroke = canvas.stroke();
-    // On whole pixels, or it would be twice as wide and half as dark.
-    let y = (at[1] - stroke / 2.0).round();
-    let tick = [at[0] + stroke, y, at[0] + stroke + 0.3 * canvas.em, y + stroke];
-    let mut shape = canvas.shape(tick);
-    shape.rectangle(tick);
-    canvas.halo_of(&shape);
-    canvas.fill(&shape, canvas.ink, 1.0);
 }
 
 /// A disc, as particles are, with a thin rim that keeps pale colours from vanishing.

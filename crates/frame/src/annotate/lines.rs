@@ -43,11 +43,16 @@ impl Lines {
     pub(super) fn draw(&self, canvas: &mut Canvas<'_>) {
         let size = canvas.size();
         let mut shape = Coverage::new([0.0, 0.0, canvas.width(), canvas.height()], 0.0, size);
-        let width = canvas.em / 11.0;
+        let width = (canvas.em / 11.0).max(1.0);
         for line in &self.lines {
             self.draw_line(*line, width, canvas, &mut shape);
         }
-        canvas.fill(&shape, self.color.unwrap_or(canvas.ink), 0.9);
+        // Light on dark looks stronger than dark on light, and a box should not shout.
+        let opacity = 0.85 - 0.35 * canvas.ink[0];
+        match self.color {
+            Some(color) => canvas.fill(&shape, color, 1.0),
+            None => canvas.fill(&shape, canvas.ink, opacity),
+        }
     }
 
     fn draw_line(&self, line: Line, width: f32, canvas: &Canvas<'_>, shape: &mut Coverage) {

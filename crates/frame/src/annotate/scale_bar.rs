@@ -17,8 +17,9 @@ impl ScaleBar {
     /// Draws at the bottom left, `taken` pixels from where the margin ends.
     pub(super) fn draw(&self, canvas: &mut Canvas<'_>, taken: f32) {
         let (em, margin) = (canvas.em, canvas.margin());
-        // At most a fifth of the width, so at least a twelfth.
-        let most = f64::from(0.2 * canvas.width()) / self.pixels_per_unit;
+        // At most a fifth of a picture of 4:3, so at least a twelfth of it.
+        let most = 0.2 * canvas.width().min(canvas.height() * 4.0 / 3.0);
+        let most = f64::from(most) / self.pixels_per_unit;
         let Some(round) = Round::at_most(most) else { return };
         let length = (round.value() * self.pixels_per_unit) as f32;
         let label = format!("{} {}", round.label(), self.unit);

@@ -65,7 +65,8 @@ pub enum Wanted {
     /// All of them.
     #[default]
     All,
-    /// These, by standard name; a reader may give more where leaving out saves nothing.
+    /// These, by standard name, in any case and with or without blanks; a reader may give more where
+    /// leaving out saves nothing.
     Only(Vec<String>),
 }
 
@@ -74,7 +75,7 @@ impl Wanted {
     pub fn wants(&self, name: &str) -> bool {
         match self {
             Self::All => true,
-            Self::Only(names) => names.iter().any(|n| n == name),
+            Self::Only(names) => names.iter().any(|n| names::same(n, name)),
         }
     }
 }

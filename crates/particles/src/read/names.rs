@@ -135,6 +135,15 @@ pub fn standard(name: &str) -> Option<&'static str> {
     SPELLINGS.iter().find(|(_, all)| all.contains(&name.as_str())).map(|(standard, _)| *standard)
 }
 
+/// Whether two names differ only in case, blanks and underscores.
+pub fn same(a: &str, b: &str) -> bool {
+    let letters = |name: &str| -> Vec<char> {
+        let letters = name.chars().filter(|c| !matches!(c, ' ' | '_'));
+        letters.map(|c| c.to_ascii_lowercase()).collect()
+    };
+    letters(a) == letters(b)
+}
+
 /// The standard name and the component of a vector's component that is spelled `name`, in any case,
 /// and how many components that vector has.
 pub fn component(name: &str) -> Option<(&'static str, usize, usize)> {
