@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::path::PathBuf;
+
 const LEGACY_VTK: [&str; 2] = [".vtk", ".vtk.gz"];
 
 fn ends(file: &str, all: &[&str]) -> bool {
@@ -22,7 +24,7 @@ fn houdini_geometry_agrees_with_the_facts() {
 }
 
 /// Samples of the repository, and how many particles they hold.
-const SAMPLES: [(&str, usize); 9] = [
+const SAMPLES: [(&str, usize); 7] = [
     ("cube_8_particles.vtk", 8),
     ("para_test.vtk", 12),
     ("point_cloud.vtk", 3),
@@ -30,23 +32,33 @@ const SAMPLES: [(&str, usize); 9] = [
     ("every_type_42_binary.vtk", 3),
     ("every_type_51_ascii.vtk", 3),
     ("every_type_51_binary.vtk", 3),
-    ("scatter.bgeo", 25),
-    ("test.geo", 5),
 ];
+
+/// Samples beside the repository.
+const SHARED_SAMPLES: [(&str, usize); 2] = [("sph/scatter.bgeo", 25), ("sph/test.geo", 5)];
+
+/// The samples that are there, and how many particles they hold.
+fn samples() -> Vec<(PathBuf, usize)> {
+    let own = SAMPLES.map(|(name, particles)| (common::own_data().join(name), particles));
+    let shared = common::shared_data().into_iter().flat_map(|folder| {
+        SHARED_SAMPLES.map(|(name, particles)| (folder.join(name), particles))
+    });
+    own.into_iter().chain(shared).collect()
+}
 
 #[test]
 fn samples_are_read_whole() {
-    for (name, particles) in SAMPLES {
-        let read = common::read(&common::own_data().join(name), 0);
-        assert_eq!(read.len(), particles, "{name}");
+    for (path, particles) in samples() {
+        assert_eq!(common::read(&path, 0).len(), particles, "{}", path.display());
     }
 }
 
 #[test]
 fn damage_is_an_error_at_worst() {
     let folder = common::scratch("damaged_vtk");
-    for (name, _) in SAMPLES {
-        let bytes = std::fs::read(common::own_data().join(name)).unwrap();
+    for (path, _) in samples() {
+        let bytes = std::fs::read(&path).unwrap();
+        let name = path.file_name().unwrap().to_str().unwrap();
         common::damage(&bytes, 300, |bytes| common::read_damaged(&folder, name, bytes));
     }
 }

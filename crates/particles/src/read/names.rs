@@ -49,15 +49,12 @@ pub const OCCUPANCY: &str = "Occupancy";
 pub const NORMAL: &str = "Normal";
 /// Acceleration, three components.
 pub const ACCELERATION: &str = "Acceleration";
-
 /// Which of an atom's alternate locations it is.
 pub const ALTERNATE_LOCATION: &str = "Alternate Location";
 /// What tells residues of one number apart.
 pub const INSERTION_CODE: &str = "Insertion Code";
 /// 1 where the atom is of a ligand or solvent (a `HETATM` line), else 0.
 pub const HETATM: &str = "HETATM";
-
-/// Surface normal, three components.
 /// Angular momentum, three components.
 pub const ANGULAR_MOMENTUM: &str = "Angular Momentum";
 /// Dipole moment, three components.

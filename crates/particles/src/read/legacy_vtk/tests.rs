@@ -175,7 +175,7 @@ fn every_binary_type_is_read() {
     assert_eq!(values("short"), Values::I32(vec![-2, 2570]));
     assert_eq!(values(names::COLOR), Values::U8(vec![255, 0, 0, 10, 10, 10]));
     assert_eq!(values("long"), Values::I64(vec![-5, 1 << 40]));
-    assert_eq!(values("ids"), Values::I64(vec![7, 8]));
+    assert_eq!(values(names::PARTICLE_IDENTIFIER), Values::I64(vec![7, 8]));
     assert_eq!(values("ulong"), Values::I64(vec![7, 8]));
     assert_eq!(values("bits"), Values::U8(vec![0, 1]));
     assert_eq!(values("char"), Values::I32(vec![-1, 3]));
