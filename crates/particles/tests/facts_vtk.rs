@@ -40,9 +40,9 @@ const SHARED_SAMPLES: [(&str, usize); 2] = [("sph/scatter.bgeo", 25), ("sph/test
 /// The samples that are there, and how many particles they hold.
 fn samples() -> Vec<(PathBuf, usize)> {
     let own = SAMPLES.map(|(name, particles)| (common::own_data().join(name), particles));
-    let shared = common::shared_data().into_iter().flat_map(|folder| {
-        SHARED_SAMPLES.map(|(name, particles)| (folder.join(name), particles))
-    });
+    let shared = common::shared_data()
+        .into_iter()
+        .flat_map(|folder| SHARED_SAMPLES.map(|(name, particles)| (folder.join(name), particles)));
     own.into_iter().chain(shared).collect()
 }
 

@@ -14,8 +14,17 @@ const SYMBOLS: [&str; 118] = [
 
 /// The symbol of the element that is written `text`, in any case; deuterium is `D`.
 pub(crate) fn symbol(text: &[u8]) -> Option<&'static str> {
-    let same = |symbol: &&&str| symbol.as_bytes().eq_ignore_ascii_case(text);
-    if text.eq_ignore_ascii_case(b"D") { Some("D") } else { SYMBOLS.iter().find(same).copied() }
+    // Nearly all atoms there are.
+    match text {
+        b"H" => return Some("H"),
+        b"C" => return Some("C"),
+        b"N" => return Some("N"),
+        b"O" => return Some("O"),
+        b"d" | b"D" => return Some("D"),
+        [_] | [_, _] => {}
+        _ => return None,
+    }
+    SYMBOLS.iter().find(|symbol| symbol.as_bytes().eq_ignore_ascii_case(text)).copied()
 }
 
 #[cfg(test)]

@@ -14,12 +14,14 @@ pub(crate) struct Forward {
     input: Input,
     stream: Option<Box<dyn Read + Send>>,
     at: u64,
+    /// Why compressed data ended early.
+    broken: Option<String>,
 }
 
 impl Forward {
     /// Nothing is read yet.
     pub(crate) fn new(input: Input) -> Self {
-        Self { input, stream: None, at: 0 }
+        Self { input, stream: None, at: 0, broken: None }
     }
 
     /// The file.
@@ -32,9 +34,17 @@ impl Forward {
         self.at
     }
 
+    /// Why the compressed data ended early, if it did; to the readers it is the end of the content.
+    pub(crate) fn broken(&self) -> Option<&str> {
+        self.broken.as_deref()
+    }
+
     /// Goes to byte `offset` of the content, or to its end if that comes first.
     pub(crate) fn seek(&mut self, offset: u64) -> Result<()> {
         let plain = self.input.content_bytes().is_some();
+        if self.broken.is_some() {
+            self.stream = None;
+        }
         if self.stream.is_some() && self.at <= offset && (!plain || self.at == offset) {
             return self.skip(offset - self.at).map(|_| ());
         }
@@ -52,12 +62,16 @@ impl Forward {
             self.seek(self.at + there)?;
             return Ok(there);
         }
-        let path = self.input.path().to_path_buf();
-        let stream = self.opened()?;
-        let skipped = std::io::copy(&mut stream.take(bytes), &mut std::io::sink())
-            .map_err(|e| ReadError::io(path, &e))?;
-        self.at += skipped;
-        Ok(skipped)
+        let start = self.at;
+        let mut skipped = Vec::new();
+        while self.at - start < bytes {
+            let left = bytes - (self.at - start);
+            self.read_into(&mut skipped, left.min(STEP_BYTES as u64) as usize)?;
+            if skipped.is_empty() {
+                break;
+            }
+        }
+        Ok(self.at - start)
     }
 
     /// Replaces `out` by the next `bytes` bytes, fewer at the end of the content.
@@ -68,12 +82,16 @@ impl Forward {
 
     /// Appends the next `bytes` bytes, fewer at the end of the content. Memory grows with what is there.
     pub(crate) fn read_more(&mut self, out: &mut Vec<u8>, bytes: usize) -> Result<()> {
-        let path = self.input.path().to_path_buf();
         let stream = self.opened()?;
         let before = out.len();
         out.reserve(bytes.min(STEP_BYTES));
-        stream.take(bytes as u64).read_to_end(out).map_err(|e| ReadError::io(path, &e))?;
+        let outcome = stream.take(bytes as u64).read_to_end(out);
         self.at += (out.len() - before) as u64;
+        match outcome {
+            Err(e) if self.input.content_bytes().is_none() => self.broken = Some(e.to_string()),
+            Err(e) => return Err(ReadError::io(self.input.path(), &e)),
+            Ok(_) => {}
+        }
         Ok(())
     }
 
@@ -89,8 +107,10 @@ impl Forward {
         if out.len() == bytes {
             return Ok(());
         }
+        let why = self.broken.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+        let there = out.len();
         let message =
-            format!("expected {bytes} bytes of {what}, but the file ends after {}", out.len());
+            format!("expected {bytes} bytes of {what}, but the file ends after {there}{why}");
         Err(ReadError::new(self.input.path(), Place::Byte(start), message))
     }
 

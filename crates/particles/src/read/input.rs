@@ -1,18 +1,14 @@
 //! A file as a stream of bytes, decompressed on the way.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
-use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
-
+use super::inflate;
 use crate::{ReadError, Result};
 
 /// How many decompressed bytes a format sees to recognise a file.
 const HEAD_BYTES: u64 = 64 * 1024;
-/// Size of the blocks that are read from the operating system.
-const BUFFER_BYTES: usize = 256 * 1024;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Compression {
@@ -66,7 +62,8 @@ impl Input {
     /// Opens `path` and looks at its first bytes. Gzip and Zstandard are known by their signatures.
     ///
     /// # Errors
-    /// The file cannot be opened or read, is a directory, or its compressed data is broken.
+    /// The file cannot be opened or read, is a directory, or its compressed data is broken from the
+    /// first byte on.
     pub fn open(path: &Path) -> Result<Self> {
         let io = |e: std::io::Error| ReadError::io(path, &e);
         let mut file = File::open(path).map_err(io)?;
@@ -92,11 +89,10 @@ impl Input {
         };
         let mut input =
             Self { path: path.into(), name, compression, stored_bytes, head: vec![], whole: false };
-        let mut head = Vec::new();
-        input.stream(0)?.take(HEAD_BYTES + 1).read_to_end(&mut head).map_err(io)?;
-        input.whole = head.len() as u64 <= HEAD_BYTES;
-        head.truncate(HEAD_BYTES as usize);
+        let (head, broken) = input.start(HEAD_BYTES + 1)?;
+        input.whole = head.len() as u64 <= HEAD_BYTES && broken.is_none();
         input.head = head;
+        input.head.truncate(HEAD_BYTES as usize);
         Ok(input)
     }
 
@@ -133,15 +129,27 @@ impl Input {
                 file.seek(SeekFrom::Start(offset)).map_err(io)?;
                 return Ok(Box::new(file));
             }
-            Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(
-                BufReader::with_capacity(BUFFER_BYTES, file),
-            )),
-            Compression::Zstd => {
-                Box::new(ZstdMembers::new(BufReader::with_capacity(BUFFER_BYTES, file)))
-            }
+            Compression::Gzip => inflate::gzip(file),
+            Compression::Zstd => inflate::zstd(file),
         };
         std::io::copy(&mut stream.by_ref().take(offset), &mut std::io::sink()).map_err(io)?;
         Ok(stream)
+    }
+
+    /// The first `bytes` bytes of the content; fewer where the file ends before, or its compressed data
+    /// breaks off, and then why.
+    ///
+    /// # Errors
+    /// The operating system's, or compressed data without a sound byte.
+    pub(super) fn start(&self, bytes: u64) -> Result<(Vec<u8>, Option<String>)> {
+        let mut out = Vec::new();
+        match self.stream(0)?.take(bytes).read_to_end(&mut out) {
+            Ok(_) => Ok((out, None)),
+            Err(e) if self.content_bytes().is_none() && !out.is_empty() => {
+                Ok((out, Some(e.to_string())))
+            }
+            Err(e) => Err(ReadError::io(&self.path, &e)),
+        }
     }
 
     /// The content from `offset`, `bytes` long; fewer where the file ends before.
@@ -161,56 +169,5 @@ impl Input {
             .read_to_end(&mut out)
             .map_err(|e| ReadError::io(&self.path, &e))?;
         Ok(out)
-    }
-}
-
-/// Decodes Zstandard frames one after another; skippable frames are skipped.
-struct ZstdMembers {
-    file: BufReader<File>,
-    decoder: FrameDecoder,
-    inside: bool,
-}
-
-impl ZstdMembers {
-    fn new(file: BufReader<File>) -> Self {
-        Self { file, decoder: FrameDecoder::new(), inside: false }
-    }
-}
-
-impl Read for ZstdMembers {
-    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
-        use std::io::Error;
-        loop {
-            if !self.inside {
-                if self.file.fill_buf()?.is_empty() {
-                    return Ok(0);
-                }
-                match self.decoder.init(&mut self.file) {
-                    Ok(()) => self.inside = true,
-                    Err(FrameDecoderError::ReadFrameHeaderError(
-                        ReadFrameHeaderError::SkipFrame { length, .. },
-                    )) => {
-                        let skipped = &mut self.file.by_ref().take(u64::from(length));
-                        std::io::copy(skipped, &mut std::io::sink())?;
-                        continue;
-                    }
-                    Err(e) => return Err(Error::other(e)),
-                }
-            }
-            while self.decoder.can_collect() == 0 && !self.decoder.is_finished() {
-                let one = BlockDecodingStrategy::UptoBlocks(1);
-                self.decoder.decode_blocks(&mut self.file, one).map_err(Error::other)?;
-            }
-            match self.decoder.read(out)? {
-                0 if self.decoder.is_finished() => {
-                    self.inside = false;
-                    let stored = self.decoder.get_checksum_from_data();
-                    if stored.is_some() && stored != self.decoder.get_calculated_checksum() {
-                        return Err(Error::other("the checksum does not agree"));
-                    }
-                }
-                n => return Ok(n),
-            }
-        }
     }
 }

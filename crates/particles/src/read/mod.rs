@@ -16,6 +16,7 @@ mod elements;
 mod fields;
 mod forward;
 mod houdini;
+mod inflate;
 mod input;
 mod lanes;
 mod legacy_vtk;

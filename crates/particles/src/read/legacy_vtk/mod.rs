@@ -195,8 +195,8 @@ impl<'a> DataSet<'a> {
         }
         let Some([x, y, z]) = self.dimensions else { return Ok(None) };
         let all = x.checked_mul(y).and_then(|xy| xy.checked_mul(z));
-        // Each point of a larger one has a bit of data at least.
-        let most = FREE_LATTICE_POINTS.max(8 * self.cursor.len() as u64);
+        // Each point of a larger one has a byte of data at least.
+        let most = FREE_LATTICE_POINTS.max(self.cursor.len() as u64);
         match all.filter(|all| *all as u64 <= most) {
             Some(all) => Ok(Some(all)),
             None => {

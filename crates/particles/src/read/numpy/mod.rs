@@ -34,7 +34,7 @@ impl Format for Npy {
     }
 
     fn open(&self, input: Input) -> Result<Box<dyn Reader>> {
-        let header = input.read(0, HEADER_BYTES)?;
+        let (header, _) = input.start(HEADER_BYTES)?;
         let array = Array::parse(&header)
             .map_err(|(at, message)| ReadError::new(input.path(), Place::Byte(at), message))?;
         let view = array.table().filter(|_| !array.items.is_empty()).ok_or_else(|| {
@@ -228,7 +228,13 @@ impl Reader for NpyReader {
     fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(whole) = self.whole.filter(|whole| *whole < self.view.frames.0) {
-            warnings.push(format!("{} frames are declared, {whole} are whole", self.view.frames.0));
+            let declared = self.view.frames.0;
+            let why = self
+                .forward
+                .broken()
+                .map(|why| format!(": the compressed data ends early ({why})"));
+            let why = why.unwrap_or_default();
+            warnings.push(format!("{declared} frames are declared, {whole} are whole{why}"));
         }
         if !self.array.left_out.is_empty() {
             warnings.push(format!("left out, no numbers: {}", self.array.left_out.join(", ")));

@@ -2,9 +2,7 @@
 
 use std::io::Read;
 
-use flate2::read::DeflateDecoder;
-
-use crate::read::Input;
+use crate::read::{Input, inflate};
 use crate::{Place, ReadError, Result};
 
 /// What a local file header begins with.
@@ -138,6 +136,6 @@ impl Member {
         };
         let start = self.header + 30 + name + extra;
         let stored = input.stream(start)?.take(self.compressed);
-        if self.deflated { Ok(Box::new(DeflateDecoder::new(stored))) } else { Ok(Box::new(stored)) }
+        if self.deflated { Ok(inflate::deflate(stored)) } else { Ok(Box::new(stored)) }
     }
 }

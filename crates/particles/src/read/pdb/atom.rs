@@ -1,9 +1,8 @@
 //! `ATOM` and `HETATM` lines: columns to values.
 
-use std::collections::HashMap;
-
+use super::fields::{OVERFLOWED, Words, columns, number, numbers, real};
 use crate::read::elements::symbol;
-use crate::read::text::{Wrong, integer, shown};
+use crate::read::text::{Wrong, shown};
 use crate::read::{Wanted, names};
 use crate::{Column, Particles, PositionBuilder, Values};
 
@@ -12,65 +11,12 @@ pub(super) fn is_atom(line: &[u8]) -> bool {
     line.starts_with(b"ATOM  ") || line.starts_with(b"HETATM")
 }
 
-/// The three coordinates in columns 31–54, each of eight columns.
-pub(super) fn numbers(place: &[u8]) -> Option<[f64; 3]> {
-    let mut values = [0.0; 3];
-    for (value, field) in values.iter_mut().zip(place.chunks_exact(8)) {
-        *value = fast_float2::parse(field.trim_ascii()).ok()?;
-    }
-    Some(values)
-}
-
-/// Words of up to four bytes, with their dictionary in order of first appearance.
-#[derive(Clone, Debug, Default)]
-struct Words {
-    codes: Vec<u32>,
-    words: Vec<[u8; 4]>,
-    index: HashMap<[u8; 4], u32>,
-}
-
-impl Words {
-    fn code(&mut self, word: [u8; 4]) -> u32 {
-        let next = self.words.len() as u32;
-        let words = &mut self.words;
-        *self.index.entry(word).or_insert_with(|| {
-            words.push(word);
-            next
-        })
-    }
-
-    fn push(&mut self, word: &[u8]) {
-        let word = word.trim_ascii();
-        let mut key = [0; 4];
-        let bytes = word.len().min(4);
-        key[..bytes].copy_from_slice(&word[..bytes]);
-        let last = self.codes.last().filter(|code| self.words[**code as usize] == key).copied();
-        let code = last.unwrap_or_else(|| self.code(key));
-        self.codes.push(code);
-    }
-
-    fn append(&mut self, other: Self) {
-        let codes: Vec<_> = other.words.into_iter().map(|word| self.code(word)).collect();
-        self.codes.extend(other.codes.into_iter().map(|code| codes[code as usize]));
-    }
-
-    fn finish(self) -> Values {
-        let text = |word: [u8; 4]| String::from_utf8_lossy(&word).trim_end_matches('\0').to_owned();
-        Values::Names { codes: self.codes, names: self.words.into_iter().map(text).collect() }
-    }
-
-    fn is_blank(&self) -> bool {
-        self.words.iter().all(|word| *word == [0; 4])
-    }
-}
-
-/// A number that the file's columns were too narrow for.
-const OVERFLOWED: i64 = i64::MIN;
-
 /// Particles column by column.
 #[derive(Default)]
 pub(super) struct Atoms {
     positions: Vec<[f64; 3]>,
+    /// The positions of what was appended.
+    builder: PositionBuilder,
     serials: Vec<i64>,
     residues: Vec<i64>,
     occupancies: Vec<f64>,
@@ -83,44 +29,6 @@ pub(super) struct Atoms {
     chains: Words,
     alternates: Words,
     insertions: Words,
-}
-
-/// Columns `first` to `last` of a line, counted from 1; what is not there is blank.
-fn columns(line: &[u8], first: usize, last: usize) -> &[u8] {
-    line.get(first - 1..last.min(line.len())).unwrap_or_default()
-}
-
-/// A serial or residue number: decimal; `A000` after `9999` (hybrid-36); hexadecimal; or stars.
-fn number(field: &[u8]) -> Option<i64> {
-    let field = field.trim_ascii();
-    if field.is_empty() || field.iter().all(|b| *b == b'*') {
-        return Some(OVERFLOWED);
-    }
-    integer(field)
-        .or_else(|| hybrid36(field))
-        .or_else(|| i64::from_str_radix(std::str::from_utf8(field).ok()?, 16).ok())
-}
-
-/// Numbers beyond the decimals of a field's width, which must be full (Grosse-Kunstleve, *hybrid-36*):
-/// base 36 in capitals from `A0…`, then in small letters from `a0…`.
-fn hybrid36(field: &[u8]) -> Option<i64> {
-    let width = u32::try_from(field.len()).ok().filter(|w| matches!(w, 4 | 5))?;
-    let is_small = match field[0] {
-        b'A'..=b'Z' => false,
-        b'a'..=b'z' => true,
-        _ => return None,
-    };
-    let value = field.iter().try_fold(0, |value, byte| {
-        let digit = match byte {
-            b'0'..=b'9' => byte - b'0',
-            b'A'..=b'Z' if !is_small => byte - b'A' + 10,
-            b'a'..=b'z' if is_small => byte - b'a' + 10,
-            _ => return None,
-        };
-        Some(value * 36 + i64::from(digit))
-    })?;
-    let block = 36i64.pow(width - 1);
-    Some(value + 10i64.pow(width) + if is_small { 16 * block } else { -10 * block })
 }
 
 /// Residues of which all atoms are H, C, N, O, P or S.
@@ -162,16 +70,6 @@ fn charge(field: &[u8]) -> i32 {
         [digit @ b'0'..=b'9', b'-'] | [b'-', digit @ b'0'..=b'9'] => -i32::from(digit - b'0'),
         _ => 0,
     }
-}
-
-/// A real number, or `default` where the columns are blank or full of stars.
-fn real(line: &[u8], first: usize, last: usize, default: f64) -> Result<f64, String> {
-    let field = columns(line, first, last).trim_ascii();
-    if field.iter().all(|b| *b == b'*') {
-        return Ok(default);
-    }
-    fast_float2::parse(field)
-        .map_err(|_| format!("expected a number in columns {first}–{last}, found {}", shown(field)))
 }
 
 impl Atoms {
@@ -223,7 +121,7 @@ impl Atoms {
 
     /// Adds what follows.
     pub(super) fn append(&mut self, other: Self) {
-        self.positions.extend(other.positions);
+        self.builder.push(&other.positions);
         self.serials.extend(other.serials);
         self.residues.extend(other.residues);
         self.occupancies.extend(other.occupancies);
@@ -238,14 +136,12 @@ impl Atoms {
         self.insertions.append(other.insertions);
     }
 
-    /// The frame. Columns that are blank in every line are left out.
+    /// The frame of what was appended. Columns that are blank in every line are left out.
     pub(super) fn finish(mut self, wanted: &Wanted) -> Particles {
         // A serial that did not fit counts on; a residue that did not fit is that before it.
         fill(&mut self.serials, 1);
         fill(&mut self.residues, 0);
-        let mut builder = PositionBuilder::default();
-        builder.push(&self.positions);
-        let (origin, positions) = builder.finish();
+        let (origin, positions) = self.builder.finish();
         let residues = self.residues.into_iter().map(|n| n as i32).collect();
         let mut columns = Vec::new();
         let mut add = |name: &str, values: Values| {
@@ -291,26 +187,6 @@ fn fill(numbers: &mut [i64], step: i64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn hybrid_36_goes_on_where_decimals_end() {
-        let known = [
-            (&b"99999"[..], 99_999),
-            (b"A0000", 100_000),
-            (b"A000Z", 100_035),
-            (b"ZZZZZ", 43_770_015),
-            (b"a0000", 43_770_016),
-            (b"zzzzz", 87_440_031),
-            (b"A000", 10_000),
-            (b"zzzz", 2_436_111),
-            (b"-999", -999),
-            (b"186a0", 100_000),
-            (b"*****", OVERFLOWED),
-        ];
-        for (field, value) in known {
-            assert_eq!(number(field), Some(value), "{}", shown(field));
-        }
-    }
 
     #[test]
     fn the_element_is_the_column_else_the_name() {

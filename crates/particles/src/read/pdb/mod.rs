@@ -5,8 +5,10 @@
 //! is the box, unless it is the 1 Å cell that stands for none. Everything else is passed over.
 
 mod atom;
+mod fields;
 
-use self::atom::{Atoms, is_atom, numbers};
+use self::atom::{Atoms, is_atom};
+use self::fields::numbers;
 use super::rows::Stop;
 use super::text::{Block, Lines, Mark};
 use super::trajectory::{Layout, Trajectory};
@@ -61,7 +63,7 @@ impl Format for Pdb {
     }
 
     fn open(&self, input: Input) -> crate::Result<Box<dyn Reader>> {
-        let title = input.read(0, TITLE_BYTES)?;
+        let (title, _) = input.start(TITLE_BYTES)?;
         let mut lines = title.split(|b| *b == b'\n').take_while(|line| !is_atom(line));
         let cell = lines.find_map(cell).flatten();
         Ok(Box::new(Trajectory::open(PdbLayout { cell }, input)?))

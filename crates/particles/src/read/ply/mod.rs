@@ -39,7 +39,7 @@ impl Format for Ply {
     }
 
     fn open(&self, input: Input) -> Result<Box<dyn Reader>> {
-        let header = header::parse(input.path(), &input.read(0, HEADER_BYTES)?)?;
+        let header = header::parse(input.path(), &input.start(HEADER_BYTES)?.0)?;
         let path = input.path().to_path_buf();
         let body = match header.encoding {
             Encoding::Ascii => Body::Text(Lines::new(input)),
