@@ -11,6 +11,7 @@
 //! - Columns carry the field's standard names ([`names`]); those it does not know keep their own.
 //! - An incomplete last frame is a warning, and the whole frames before it are served.
 
+mod dictionary;
 mod dump;
 mod elements;
 mod fields;
@@ -32,7 +33,12 @@ mod xyz;
 
 pub use input::{Head, Input};
 
+use std::path::Path;
+
 use crate::{Particles, Place, ReadError, Result};
+
+/// The most components a column has.
+const MOST_COMPONENTS: usize = 9;
 
 /// How sure a format is that a file is its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -123,7 +129,7 @@ pub static FORMATS: &[&dyn Format] = &[
 ///
 /// # Errors
 /// The file cannot be read, is empty, or no format recognises it.
-pub fn open(path: &std::path::Path) -> Result<(&'static str, Box<dyn Reader>)> {
+pub fn open(path: &Path) -> Result<(&'static str, Box<dyn Reader>)> {
     let input = Input::open(path)?;
     if input.head().bytes.is_empty() {
         return Err(ReadError::new(path, Place::Whole, "the file is empty"));
@@ -140,5 +146,17 @@ pub fn open(path: &std::path::Path) -> Result<(&'static str, Box<dyn Reader>)> {
             let message = format!("no known format; Motes reads {}", known.join(", "));
             Err(ReadError::new(path, Place::Whole, message))
         }
+    }
+}
+
+/// Refuses all but frame 0 of a file that is one frame.
+fn only_frame(path: &Path, frame: usize) -> Result<()> {
+    match frame {
+        0 => Ok(()),
+        _ => Err(ReadError::new(
+            path,
+            Place::Frame(frame),
+            "there is no such frame; the file is one",
+        )),
     }
 }

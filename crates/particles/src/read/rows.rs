@@ -4,8 +4,7 @@
 //! field of a line belongs to. [`read_rows`] does the rest, a block at a time, in parallel, with the
 //! same result for any number of threads.
 
-use std::collections::HashMap;
-
+use super::dictionary::Dictionary;
 use super::text::{self, Block, Lines, Separator, Wrong};
 use super::{Progress, Wanted, names};
 use crate::{Column, Particles, PositionBuilder, Radius, ReadError, Values};
@@ -104,31 +103,6 @@ impl Schema {
     }
 }
 
-/// Words with a dictionary in order of first appearance.
-#[derive(Debug, Default)]
-struct Dictionary {
-    codes: Vec<u32>,
-    names: Vec<Box<[u8]>>,
-    known: HashMap<Box<[u8]>, u32>,
-}
-
-impl Dictionary {
-    fn code(&mut self, word: &[u8]) -> u32 {
-        if let Some(code) = self.known.get(word) {
-            return *code;
-        }
-        let code = self.names.len() as u32;
-        self.names.push(word.into());
-        self.known.insert(word.into(), code);
-        code
-    }
-
-    fn append(&mut self, other: Self) {
-        let map: Vec<u32> = other.names.iter().map(|name| self.code(name)).collect();
-        self.codes.extend(other.codes.iter().map(|code| map[*code as usize]));
-    }
-}
-
 /// The values of a group, row by row.
 #[derive(Debug)]
 enum Cells {
@@ -197,10 +171,7 @@ impl Cells {
             },
             Self::Word(d) => {
                 let at = d.codes.len() - back;
-                // Neighbours in a file are mostly of one kind.
-                let code = d.codes.get(at.wrapping_sub(1)).copied();
-                let same = code.filter(|c| d.names.get(*c as usize).is_some_and(|n| **n == *token));
-                d.codes[at] = same.unwrap_or_else(|| d.code(token));
+                d.codes[at] = d.code(token);
                 true
             }
         }
@@ -245,10 +216,7 @@ impl Cells {
             Self::Integer(v) => Values::I64(v),
             Self::Real(v) => Values::F64(v),
             Self::Byte(v) => Values::U8(v),
-            Self::Word(d) => Values::Names {
-                codes: d.codes,
-                names: d.names.iter().map(|n| String::from_utf8_lossy(n).into_owned()).collect(),
-            },
+            Self::Word(d) => d.into_values(),
         }
     }
 }

@@ -10,7 +10,10 @@
 mod ascii;
 mod binary;
 
-use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted, names};
+use super::dictionary::Dictionary;
+use super::{
+    Confidence, Format, Head, Input, MOST_COMPONENTS, Progress, Reader, Wanted, names, only_frame,
+};
 use crate::{Column, Particles, Place, PositionBuilder, Radius, ReadError, Result, Values};
 
 /// The first bytes of classic binary geometry.
@@ -21,9 +24,6 @@ const ASCII: &[u8] = b"PGEOMETRY";
 const JSON_BINARY: &[u8] = b"\x7fNSJb";
 /// The version that is read.
 const VERSION: i32 = 5;
-/// The most components a column has.
-const MOST_COMPONENTS: usize = 9;
-
 /// What Houdini's users call the standard properties.
 const SPELLINGS: [(&str, &str, usize); 6] = [
     ("v", names::VELOCITY, 3),
@@ -81,10 +81,7 @@ impl Reader for Geometry {
 
     fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
         let path = self.input.path();
-        if frame > 0 {
-            let message = format!("there is no frame {frame}; Houdini geometry has only frame 0");
-            return Err(ReadError::new(path, Place::Whole, message));
-        }
+        only_frame(path, frame)?;
         let all = self.input.stored_bytes();
         progress(0, all);
         let bytes = self.input.read(0, u64::MAX)?;
@@ -170,17 +167,12 @@ impl Points {
 
 /// Indices as names, in order of first appearance; −1, and an index without a string, is no name.
 fn named(indices: impl Iterator<Item = i32>, strings: &[String]) -> Values {
-    let (mut codes, mut names) = (Vec::new(), Vec::new());
-    let mut known = std::collections::HashMap::new();
+    let mut dictionary = Dictionary::default();
     for index in indices {
         let name = usize::try_from(index).ok().and_then(|i| strings.get(i));
-        let code = *known.entry(name).or_insert_with(|| {
-            names.push(name.cloned().unwrap_or_default());
-            names.len() as u32 - 1
-        });
-        codes.push(code);
+        dictionary.push(name.map_or(b"", |name| name.as_bytes()));
     }
-    Values::Names { codes, names }
+    dictionary.into_values()
 }
 
 /// Which attributes have more components than a column may have.

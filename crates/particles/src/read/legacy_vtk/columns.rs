@@ -1,10 +1,7 @@
 //! The arrays of points, as columns with standard names.
 
-use crate::read::{Wanted, names};
+use crate::read::{MOST_COMPONENTS, Wanted, names};
 use crate::{Column, Radius, Values};
-
-/// The most components a column has.
-const MOST_COMPONENTS: usize = 9;
 
 /// The columns as far as they are read.
 pub(super) struct Columns<'a> {

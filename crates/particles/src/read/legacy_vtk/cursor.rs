@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::read::dictionary::Dictionary;
 use crate::read::text;
 use crate::{Place, ReadError, Result, Values};
 
@@ -337,20 +338,15 @@ impl<'a> Cursor<'a> {
     /// Strings: a line each in ASCII, behind their length in binary.
     fn strings(&mut self, count: usize) -> Result<Values> {
         self.end_line();
-        let (mut codes, mut names) = (Vec::new(), Vec::<String>::new());
-        let mut known = std::collections::HashMap::new();
+        let mut dictionary = Dictionary::default();
         for i in 0..count {
             if self.rest().is_empty() {
                 return Err(self.short(i, count));
             }
             let name = if self.binary { self.binary_string()? } else { decoded(self.end_line()) };
-            let code = *known.entry(name).or_insert_with_key(|name| {
-                names.push(name.clone());
-                names.len() as u32 - 1
-            });
-            codes.push(code);
+            dictionary.push(name.as_bytes());
         }
-        Ok(Values::Names { codes, names })
+        Ok(dictionary.into_values())
     }
 
     /// The two highest bits say in how many bytes the length is written.

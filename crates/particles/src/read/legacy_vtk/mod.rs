@@ -12,8 +12,8 @@ mod cursor;
 use columns::Columns;
 use cursor::{Cursor, Type};
 
-use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted};
-use crate::{Particles, Place, PositionBuilder, ReadError, Result, Values};
+use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted, only_frame};
+use crate::{Particles, PositionBuilder, Result, Values};
 
 /// A lattice of points may have this many, however small the file: it has to be stored in no array.
 const FREE_LATTICE_POINTS: u64 = 1 << 20;
@@ -51,10 +51,7 @@ impl Reader for VtkFile {
 
     fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
         let path = self.input.path();
-        if frame > 0 {
-            let message = format!("there is no frame {frame}; a legacy VTK file has only frame 0");
-            return Err(ReadError::new(path, Place::Whole, message));
-        }
+        only_frame(path, frame)?;
         let all = self.input.stored_bytes();
         progress(0, all);
         let bytes = self.input.read(0, u64::MAX)?;

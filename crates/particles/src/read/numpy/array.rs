@@ -1,14 +1,13 @@
 //! One NPY array: its header (NumPy's `numpy.lib.format`, versions 1 to 3) and where its numbers lie.
 
 use super::literal::{Literal, parse};
+use crate::read::MOST_COMPONENTS;
 use crate::read::lanes::{ByteOrder, Scalar};
 
 /// What every NPY file begins with.
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 /// No header is longer; NumPy itself refuses more than 10 kB unless told otherwise.
 pub(super) const HEADER_BYTES: u64 = 1 << 20;
-/// The most values a column may have per particle.
-const MOST_COMPONENTS: usize = 9;
 /// Two to four rows with more columns than this are x, y, z (and the radius) one after another.
 pub(super) const MOST_COLUMNS_BESIDE_ROWS: u64 = 16;
 

@@ -1,6 +1,7 @@
 //! `ATOM` and `HETATM` lines: columns to values.
 
-use super::fields::{OVERFLOWED, Words, columns, number, numbers, real};
+use super::fields::{OVERFLOWED, columns, number, numbers, real, trim};
+use crate::read::dictionary::Dictionary;
 use crate::read::elements::symbol;
 use crate::read::text::{Wrong, shown};
 use crate::read::{Wanted, names};
@@ -23,12 +24,12 @@ pub(super) struct Atoms {
     b_factors: Vec<f64>,
     charges: Vec<i32>,
     hetatm: Vec<u8>,
-    elements: Words,
-    atoms: Words,
-    residue_names: Words,
-    chains: Words,
-    alternates: Words,
-    insertions: Words,
+    elements: Dictionary,
+    atoms: Dictionary,
+    residue_names: Dictionary,
+    chains: Dictionary,
+    alternates: Dictionary,
+    insertions: Dictionary,
 }
 
 /// Residues of which all atoms are H, C, N, O, P or S.
@@ -104,9 +105,9 @@ impl Atoms {
         self.b_factors.push(real(line, 61, 66, 0.0)?);
         self.charges.push(charge(columns(line, 79, 80)));
         self.hetatm.push(u8::from(line.starts_with(b"HETATM")));
-        let mut word = |words: fn(&mut Self) -> &mut Words, name: &str, word: &[u8]| {
+        let mut word = |words: fn(&mut Self) -> &mut Dictionary, name: &str, word: &[u8]| {
             if wanted.wants(name) {
-                words(self).push(word);
+                words(self).push(trim(word));
             }
         };
         word(|a| &mut a.elements, names::PARTICLE_TYPE, element(line).as_bytes());
@@ -150,9 +151,9 @@ impl Atoms {
             }
         };
         add(names::PARTICLE_IDENTIFIER, Values::I64(self.serials));
-        add(names::PARTICLE_TYPE, self.elements.finish());
-        add(names::ATOM_NAME, self.atoms.finish());
-        add(names::RESIDUE_NAME, self.residue_names.finish());
+        add(names::PARTICLE_TYPE, self.elements.into_values());
+        add(names::ATOM_NAME, self.atoms.into_values());
+        add(names::RESIDUE_NAME, self.residue_names.into_values());
         add(names::RESIDUE_IDENTIFIER, Values::I32(residues));
         for (name, words) in [
             (names::CHAIN, self.chains),
@@ -160,7 +161,7 @@ impl Atoms {
             (names::INSERTION_CODE, self.insertions),
         ] {
             if !words.is_blank() {
-                add(name, words.finish());
+                add(name, words.into_values());
             }
         }
         add(names::OCCUPANCY, Values::F64(self.occupancies));

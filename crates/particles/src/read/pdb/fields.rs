@@ -1,12 +1,9 @@
 //! The fields of a line: numbers and words in fixed columns.
 
-use std::collections::HashMap;
-
-use crate::Values;
 use crate::read::text::{integer, shown};
 
 /// A field without the blanks around it; these are few.
-fn trim(mut field: &[u8]) -> &[u8] {
+pub(super) fn trim(mut field: &[u8]) -> &[u8] {
     while let [b' ' | b'\t' | b'\r' | b'\n', rest @ ..] = field {
         field = rest;
     }
@@ -52,68 +49,6 @@ pub(super) fn numbers(place: &[u8]) -> Option<[f64; 3]> {
         *value = decimal(trim(field))?;
     }
     Some(values)
-}
-
-/// Words of up to four bytes, with their dictionary in order of first appearance.
-#[derive(Clone, Debug)]
-pub(super) struct Words {
-    codes: Vec<u32>,
-    words: Vec<[u8; 4]>,
-    index: HashMap<[u8; 4], u32>,
-    /// Words seen lately with their codes, by a few bits of the word: most lines repeat one.
-    recent: [([u8; 4], u32); RECENT],
-}
-
-/// A power of two.
-const RECENT: usize = 64;
-
-impl Default for Words {
-    fn default() -> Self {
-        let recent = [([0; 4], u32::MAX); RECENT];
-        Self { codes: Vec::new(), words: Vec::new(), index: HashMap::new(), recent }
-    }
-}
-
-impl Words {
-    fn code(&mut self, word: [u8; 4]) -> u32 {
-        let next = self.words.len() as u32;
-        let words = &mut self.words;
-        *self.index.entry(word).or_insert_with(|| {
-            words.push(word);
-            next
-        })
-    }
-
-    /// Adds a word without the blanks around it; of a longer one four bytes.
-    pub(super) fn push(&mut self, word: &[u8]) {
-        let word = trim(word);
-        let mut key = [0; 4];
-        let bytes = word.len().min(4);
-        key[..bytes].copy_from_slice(&word[..bytes]);
-        // The golden ratio spreads the bits.
-        let place = u32::from_le_bytes(key).wrapping_mul(0x9e37_79b9) as usize >> 26;
-        let (known, code) = self.recent[place % RECENT];
-        let code = if known == key && code != u32::MAX { code } else { self.code(key) };
-        self.recent[place % RECENT] = (key, code);
-        self.codes.push(code);
-    }
-
-    /// Adds what follows.
-    pub(super) fn append(&mut self, other: Self) {
-        let codes: Vec<_> = other.words.into_iter().map(|word| self.code(word)).collect();
-        self.codes.extend(other.codes.into_iter().map(|code| codes[code as usize]));
-    }
-
-    /// The words as a column's values.
-    pub(super) fn finish(self) -> Values {
-        let text = |word: [u8; 4]| String::from_utf8_lossy(&word).trim_end_matches('\0').to_owned();
-        Values::Names { codes: self.codes, names: self.words.into_iter().map(text).collect() }
-    }
-
-    /// Whether there is no word but the empty one.
-    pub(super) fn is_blank(&self) -> bool {
-        self.words.iter().all(|word| *word == [0; 4])
-    }
 }
 
 /// A number that the file's columns were too narrow for.
@@ -203,18 +138,5 @@ mod tests {
         for text in ["", "-", ".", "1.2.3", "1-2", "x", "--1"] {
             assert_eq!(decimal(text.as_bytes()), None, "{text}");
         }
-    }
-
-    #[test]
-    fn words_keep_the_order_of_first_appearance() {
-        let mut words = Words::default();
-        [&b" CA "[..], b"", b"N", b"CA", b"\xff\xff\xff\xff", b"    ", b"N   "]
-            .map(|w| words.push(w));
-        let mut more = Words::default();
-        [&b"O"[..], b"N"].map(|w| more.push(w));
-        words.append(more);
-        let Values::Names { codes, names } = words.finish() else { panic!("no names") };
-        assert_eq!(codes, [0, 1, 2, 0, 3, 1, 2, 4, 2]);
-        assert_eq!((&*names[0], &*names[1], &*names[2], &*names[4]), ("CA", "", "N", "O"));
     }
 }

@@ -15,7 +15,7 @@ use super::fields::{Plan, Slot, Table};
 use super::forward::Forward;
 use super::lanes::{ByteOrder, Lane};
 use super::text::{Lines, Mark};
-use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted};
+use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted, only_frame};
 use crate::{Particles, Place, ReadError, Result};
 
 /// No header is longer.
@@ -211,9 +211,7 @@ impl Reader for PlyReader {
     }
 
     fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
-        if frame > 0 {
-            return Err(self.error(Place::Frame(frame), "a PLY file has one frame"));
-        }
+        only_frame(&self.path, frame)?;
         let elements = &self.header.elements;
         let Some(at) = elements.iter().position(|e| e.name == "vertex" && e.count > 0) else {
             return Ok(Particles::default());

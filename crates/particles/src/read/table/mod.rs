@@ -8,7 +8,7 @@ mod layout;
 
 use super::rows::{self, Schema};
 use super::text::Lines;
-use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted};
+use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted, only_frame};
 use crate::{Particles, Place, Radius, ReadError, Result};
 use columns::Roles;
 use layout::Layout;
@@ -67,10 +67,7 @@ impl Reader for Rows {
     }
 
     fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
-        if frame > 0 {
-            let message = "there is no such frame; a table is one";
-            return Err(ReadError::new(self.lines.input().path(), Place::Frame(frame), message));
-        }
+        only_frame(self.lines.input().path(), frame)?;
         self.lines.go_to(super::text::Mark::START)?;
         self.lines.skip(self.layout.first_row - 1)?;
         let mut schema = Schema {
