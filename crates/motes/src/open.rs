@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use glam::DVec3;
 use motes_frame::scene_in_png;
 use motes_particles::read::{Input, open_input};
 use motes_particles::{Place, ReadError, Series};
@@ -31,10 +32,14 @@ pub fn open(source: &str) -> Result<Series> {
     Ok(Series::from_reader(format, reader))
 }
 
-/// The scene of [`BUILT_IN`]: an antibody, its chains told apart by colour.
+/// The scene of [`BUILT_IN`]: an antibody upright, its arms spread before the eye, its chains told
+/// apart by colour.
 pub fn built_in_scene() -> Scene {
     let mut scene = Scene::default();
     scene.set_sources(&[BUILT_IN.into()]);
+    // Along the direction of least spread; up is from the stem to the arms.
+    scene.camera.direction = Some(DVec3::new(0.94, -0.33, -0.07));
+    scene.camera.up = Some(DVec3::new(-0.32, -0.93, 0.19));
     scene.system.iter_mut().for_each(|system| system.color.by = ColorBy::Chain);
     scene
 }

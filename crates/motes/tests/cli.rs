@@ -326,6 +326,7 @@ fn bad_usage_names_the_nearest_word() {
         (&["render", demo, "-o", "a.png", "--renderer", "density"], "not in this version"),
         (&["render", demo, "-o", "a.png", "--colormap", "viridi"], "`viridis`"),
         (&["render", demo, "-o", "a.png", "--color-by", "Positoin"], "`Position`"),
+        (&["render", demo, "-o", "a.png", "--color-by", "elemnt"], "`element`"),
         (&["render", demo, "-o", "a.png", "--set", "camera.fow=3"], "`camera.fov`"),
         (&["render", demo, "-o", "a.png", "--fov", "wide"], "--fov: expected a number"),
         (&["render", demo, "-o", "a.png", "--fov", "200"], "camera.fov"),

@@ -12,11 +12,11 @@ use super::values::{count, size, threads, whole};
 
 const EXAMPLES: &str = "\
 Examples:
-  motes render -o picture.png                     a picture, without any file
+  motes render -o picture.png                        a picture, without any file
   motes render dump.lammpstrj -o out.png --color-by Velocity --colormap magma
   motes render 'out_*.vtk' -o film/%04d.png --frame all --size 1080p
   motes render fluid.ply walls.ply -o out.png --set system.1.color.by=uniform
-  motes render picture.png -o large.png --size 4k the same picture, larger";
+  motes render picture.png -o large.png --size 4k    the same picture, larger";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
@@ -32,7 +32,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// The way of seeing: spheres
-    #[arg(long, value_name = "NAME", default_value = "spheres", hide_default_value = true)]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "spheres",
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
     renderer: Renderer,
     /// Frame from 0, frames A..B, all or last
     #[arg(long, value_name = "N|A..B")]

@@ -7,10 +7,10 @@ use std::io::{ErrorKind, Write};
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Talk {
     /// Say nothing but errors
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     pub quiet: bool,
     /// Say more: where the time and the memory go
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 901)]
     pub verbose: bool,
 }
 
