@@ -71,7 +71,7 @@ fn help_fits_a_screen() {
     ];
     for args in verbs {
         let help = succeeds(&here, args);
-        assert!(help.lines().count() <= 55, "{args:?}: {} lines", help.lines().count());
+        assert!(help.lines().count() <= 50, "{args:?}: {} lines", help.lines().count());
         assert!(help.contains("Example"), "{args:?}");
         let widest = help.lines().map(|l| l.chars().count()).max().unwrap();
         assert!(widest <= 100, "{args:?}: {widest} columns");
@@ -252,6 +252,21 @@ fn two_sources_in_one_picture() {
     let radius = ["--set", "system.1.radius=0.01"];
     assert_ne!(stats(&here, &[&[a, b], &radius[..]].concat())["hash"], both["hash"]);
     assert_eq!(hash(&here, &["both.png"]), both["hash"].as_str().unwrap());
+}
+
+#[test]
+fn only_what_is_asked_for_is_shown() {
+    let here = folder("where");
+    let source = data("1l2y.pdb");
+    let visible = |args: &[&str]| {
+        stats(&here, &[&[source.as_str()], args].concat())["particles"]["visible"].as_u64().unwrap()
+    };
+    assert_eq!(visible(&[]), 304);
+    // The 20 residues have one Cα each.
+    assert_eq!(visible(&["--where", "`Atom Name` == \"CA\""]), 20);
+    assert_eq!(visible(&["--where", "`Residue Identifier` <= 0"]), 0);
+    let said = fails(&here, &["render", &source, "-o", "a.png", "--where", "Occupancy >"], 2);
+    assert_eq!(said.lines().count(), 1, "{said}");
 }
 
 #[test]
