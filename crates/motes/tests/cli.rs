@@ -165,7 +165,7 @@ fn arrays(path: PathBuf) -> Vec<(String, String)> {
         let mut file = archive.by_index(i).unwrap();
         let mut start = vec![0; 128];
         file.read_exact(&mut start).unwrap();
-        (file.name().to_owned(), String::from_utf8_lossy(&start).into_owned())
+        (file.name().unwrap().into_owned(), String::from_utf8_lossy(&start).into_owned())
     };
     (0..5).map(header).collect()
 }
@@ -196,7 +196,9 @@ fn layers_and_their_shapes() {
 fn frames_and_their_files() {
     let here = folder("frames");
     let source = data("dump_multiframe_5x8.dump");
-    stats(&here, &[&source, "--frame", "1..3", "-o", "a_%03d.png", "--stats", "a_{}.json"]);
+    let files = ["-o", "a_%03d.png", "--stats", "a_{}.json", "-q"];
+    let args = ["render", &source, "--size", "32x24", "--frame", "1..3"];
+    assert!(succeeds(&here, &[&args, &files[..]].concat()).is_empty());
     for frame in 1..=3 {
         assert!(here.join(format!("a_00{frame}.png")).exists());
         assert!(here.join(format!("a_{frame}.json")).exists());
@@ -212,7 +214,7 @@ fn frames_and_their_files() {
     let said = fails(&here, &["render", &source, "--frame", "0..2", "-o", "one.png"], 2);
     assert!(said.contains("%04d"), "{said}");
     let said = fails(&here, &["render", &source, "--frame", "7", "-o", "one.png"], 1);
-    assert!(said.contains("no frame 7") && said.contains("0 to 4"), "{said}");
+    assert!(said.contains("frame 7") && said.contains("has 5"), "{said}");
     fails(&here, &["render", &source, "--frame", "2..1", "-o", "%d.png"], 2);
 }
 
@@ -266,7 +268,7 @@ fn only_what_is_asked_for_is_shown() {
     assert_eq!(visible(&["--where", "`Atom Name` == \"CA\""]), 20);
     assert_eq!(visible(&["--where", "`Residue Identifier` <= 0"]), 0);
     let said = fails(&here, &["render", &source, "-o", "a.png", "--where", "Occupancy >"], 2);
-    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.contains("column 12"), "{said}");
 }
 
 #[test]

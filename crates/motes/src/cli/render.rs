@@ -20,7 +20,7 @@ Examples:
 
 /// As typed.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
 pub(crate) struct Args {
     /// Files, quoted patterns, demo:KIND:N, or a picture to draw again
     #[arg(value_name = "SOURCE")]
