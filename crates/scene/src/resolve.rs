@@ -8,6 +8,9 @@ use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
 
+/// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
+const MAX_PIXELS: u64 = 1 << 28;
+
 /// A scene that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resolved {
@@ -198,6 +201,8 @@ fn check_image(image: &Image) -> Result<()> {
     for (path, size) in [("image.width", image.width), ("image.height", image.height)] {
         need(path, size, (1..=65_535).contains(&size), "1 to 65535 pixels")?;
     }
+    let pixels = u64::from(image.width) * u64::from(image.height);
+    need("image.width × height", pixels, pixels <= MAX_PIXELS, "at most 2^28 pixels in all")?;
     let samples = image.samples;
     need("image.samples", samples, (1..=1024).contains(&samples), "1 to 1024 rays per pixel")?;
     let e = image.exposure;
@@ -254,6 +259,7 @@ mod tests {
         for (assignments, path) in [
             (&["camera.fov=0"][..], "camera.fov"),
             (&["camera.fov=180"], "camera.fov"),
+            (&["image.width=65535", "image.height=65535"], "image.width × height"),
             (&["camera.fov=nan"], "camera.fov"),
             (&["camera.up=0,0,0"], "camera.up"),
             (&["camera.position=1,2,inf"], "camera.position"),

@@ -125,6 +125,8 @@ settings! {
         width: u32 = 1920,
         /// Height, pixels.
         height: u32 = 1080,
+        /// Which frame of the sources is shown, counted from 0.
+        frame: u32 = 0,
         /// Rays per pixel.
         samples: u32 = 4,
         /// Leaves the background out: alpha 0 where nothing is.
