@@ -130,8 +130,6 @@ pub static FORMATS: &[&dyn Format] = &[
 /// # Errors
 /// The file cannot be read, is empty, or no format recognises it.
 pub fn open(path: &Path) -> Result<(&'static str, Box<dyn Reader>)> {
-    let input = Input::open(path)?;
-pub fn open(path: &std::path::Path) -> Result<(&'static str, Box<dyn Reader>)> {
     open_input(Input::open(path)?)
 }
 
