@@ -40,6 +40,10 @@ pub(crate) fn intersect<S: Simd>(
     let zero = f32x16::splat(simd, 0.0);
     let mut any = false;
     for first in (0..packet.lanes()).step_by(LANES) {
+        let before = load(simd, &packet.distance, first);
+        if packet.any_hit && !before.simd_gt(zero).any_true() {
+            continue;
+        }
         let dx = load(simd, &packet.direction[0], first);
         let dy = load(simd, &packet.direction[1], first);
         let dz = load(simd, &packet.direction[2], first);
@@ -59,7 +63,6 @@ pub(crate) fn intersect<S: Simd>(
         let half = inside.max(zero).sqrt();
         let entry = b - half;
         let distance = entry.simd_gt(zero).select(entry, b + half);
-        let before = load(simd, &packet.distance, first);
         let hit = meets & distance.simd_gt(zero);
         let nearer = hit & distance.simd_lt(before);
         let ties = (hit & distance.simd_eq(before)).to_bitmask();

@@ -59,13 +59,19 @@ pub(crate) fn reaching<S: Simd>(
     }
     let mut rays = Rays::new();
     let mut sums = [(0.0, 0.0); PACKET_POINTS];
+    let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
     for group in groups(points, view.rays) {
+        // All points of a group belong to the same sample of their pixels.
+        let Some(Point { sample, of, .. }) = group.first().map(|i| points[*i as usize]) else {
+            continue;
+        };
         let sums = &mut sums[..group.len()];
         let count = lights.key.shadow_rays;
         if count > 0 {
             sums.fill((0.0, 0.0));
             for ray in 0..count {
-                let aim = |p: &Point| key_direction(&lights.key, p, (ray, count));
+                let place = (ray * of + sample, count * of);
+                let aim = |p: &Point| key_direction(&light, p, place);
                 rays.gather(points, &group, aim, f32::INFINITY);
                 trace(simd, &mut rays.packet, view.systems, counts);
                 rays.scatter(sums);
@@ -78,7 +84,9 @@ pub(crate) fn reaching<S: Simd>(
         if count > 0 {
             sums.fill((0.0, 0.0));
             for ray in 0..count {
-                let aim = |p: &Point| fill_direction(p, (ray, count));
+                let place = (ray * of + sample, count * of);
+                let part = fill_part(place);
+                let aim = |p: &Point| fill_direction(&part, p, place.0);
                 rays.gather(points, &group, aim, lights.occlusion_radius);
                 trace(simd, &mut rays.packet, view.systems, counts);
                 rays.scatter(sums);
@@ -201,36 +209,51 @@ fn lit(cosine: f32, sin_half_angle: f32) -> f32 {
     }
 }
 
-/// Ray `ray` of `rays` towards the key light: all rays of a pixel together cut its disc into parts of
-/// equal area along a Fibonacci spiral, which each pixel turns its own way.
-fn key_direction(key: &KeyLight, point: &Point, (ray, rays): (u32, u32)) -> Vec3 {
-    let (place, places) = (ray * point.of + point.sample, rays * point.of);
-    let u = (place as f32 + unit(hash(point.seed ^ place))) / places as f32;
-    let turn = place as f32 * GOLDEN_TURN + unit(hash(point.seed));
-    around(key.direction, 1.0 - u * (1.0 - key.cos_half_angle), turn)
+/// A cap of directions around an axis.
+#[derive(Clone, Copy)]
+struct Cap {
+    axis: Vec3,
+    across: (Vec3, Vec3),
+    /// One minus the cosine of the half angle at the rim.
+    depth: f32,
 }
 
-/// Ray `ray` of `rays` of the fill: all rays of a pixel together cut the sphere into parts of equal
-/// area along a Fibonacci spiral, the same for every pixel; within the part each has its own place.
-fn fill_direction(point: &Point, (ray, rays): (u32, u32)) -> Vec3 {
-    let (place, places) = (ray * point.of + point.sample, rays * point.of);
-    let random = hash(point.seed ^ place.wrapping_mul(0x9e37_79b9));
-    let z = 1.0 - 2.0 * (place as f32 + 0.5) / places as f32;
-    let middle = around(Vec3::Z, z, place as f32 * GOLDEN_TURN);
-    // A cap as large as the part.
-    let cos_cap = 1.0 - 2.0 / places as f32;
-    around(middle, 1.0 - unit(random) * (1.0 - cos_cap), unit(hash(random)))
+impl Cap {
+    fn new(axis: Vec3, cos_half_angle: f32) -> Self {
+        Self { axis, across: axis.any_orthonormal_pair(), depth: 1.0 - cos_half_angle }
+    }
+
+    /// The direction that `area` (0..1, from the middle to the rim) and `turn` (in turns) lead to.
+    fn direction(&self, area: f32, turn: f32) -> Vec3 {
+        let cosine = 1.0 - area * self.depth;
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let (sin, cos) = (turn.fract() * std::f32::consts::TAU).sin_cos();
+        self.axis * cosine + (self.across.0 * cos + self.across.1 * sin) * sine
+    }
 }
 
 /// The golden angle, in turns.
 const GOLDEN_TURN: f32 = 0.381_966;
 
-/// The unit vector at cosine `cosine` from `axis`, `turn` turns around it.
-fn around(axis: Vec3, cosine: f32, turn: f32) -> Vec3 {
-    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-    let (a, b) = axis.any_orthonormal_pair();
-    let (sin, cos) = (turn.fract() * std::f32::consts::TAU).sin_cos();
-    axis * cosine + (a * cos + b * sin) * sine
+/// The direction to part `place` of `places` of a round light: parts of equal area along a Fibonacci
+/// spiral, which each pixel turns its own way.
+fn key_direction(light: &Cap, point: &Point, (place, places): (u32, u32)) -> Vec3 {
+    let area = (place as f32 + unit(hash(point.seed ^ place))) / places as f32;
+    light.direction(area, place as f32 * GOLDEN_TURN + unit(hash(point.seed)))
+}
+
+/// Part `place` of `places` of the sphere: parts of equal area along a Fibonacci spiral, the same for
+/// every pixel.
+fn fill_part((place, places): (u32, u32)) -> Cap {
+    let area = (place as f32 + 0.5) / places as f32;
+    let middle = Cap::new(Vec3::Z, -1.0).direction(area, place as f32 * GOLDEN_TURN);
+    Cap::new(middle, 1.0 - 2.0 / places as f32)
+}
+
+/// A point's own direction within a part of the sphere.
+fn fill_direction(part: &Cap, point: &Point, place: u32) -> Vec3 {
+    let random = hash(point.seed ^ place.wrapping_mul(0x9e37_79b9));
+    part.direction(unit(random), unit(hash(random)))
 }
 
 /// A hash whose every bit depends on every bit of `x` (C. Wellons, "lowbias32").
@@ -270,7 +293,12 @@ mod tests {
     fn fill_directions_cover_the_sphere_evenly() {
         // The mean of max(0, n·d) over the sphere is 1/4, of d itself zero.
         let all: Vec<Vec3> = (0..4)
-            .flat_map(|sample| (0..16).map(move |ray| fill_direction(&point(sample, 7), (ray, 16))))
+            .flat_map(|sample| {
+                (0..16).map(move |ray| {
+                    let place = (ray * 4 + sample, 64);
+                    fill_direction(&fill_part(place), &point(sample, 7), place.0)
+                })
+            })
             .collect();
         let mean = all.iter().sum::<Vec3>() / 64.0;
         assert!(mean.length() < 0.05, "{mean}");
@@ -283,17 +311,11 @@ mod tests {
 
     #[test]
     fn key_directions_stay_within_the_light_and_fill_it() {
-        let key = KeyLight {
-            direction: Vec3::new(0.6, 0.0, 0.8),
-            color: Vec3::ONE,
-            cos_half_angle: 0.9,
-            shadow_rays: 16,
-        };
-        let all: Vec<Vec3> = (0..4)
-            .flat_map(|s| (0..16).map(move |ray| key_direction(&key, &point(s, 9), (ray, 16))))
-            .collect();
-        assert!(all.iter().all(|d| d.dot(key.direction) > 0.9 - 1e-5));
-        let mean = all.iter().map(|d| d.dot(key.direction)).sum::<f32>() / 64.0;
+        let light = Cap::new(Vec3::new(0.6, 0.0, 0.8), 0.9);
+        let all: Vec<Vec3> =
+            (0..64).map(|place| key_direction(&light, &point(place % 4, 9), (place, 64))).collect();
+        assert!(all.iter().all(|d| d.dot(light.axis) > 0.9 - 1e-5));
+        let mean = all.iter().map(|d| d.dot(light.axis)).sum::<f32>() / 64.0;
         assert!((mean - 0.95).abs() < 0.005, "{mean}");
     }
 }

@@ -7,7 +7,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd_macros::simd;
-use motes_grid::{Grid, RadiusClasses, Seen, Visibility};
+use motes_grid::{Block, Grid, RadiusClasses, Seen, Visibility};
 
 use crate::frustum::{Bounds, Frustum};
 use crate::intersect::{Cull, Sphere, cull, farthest, intersect};
@@ -177,6 +177,10 @@ impl<S: Simd> Walk<'_, S> {
         }
         let edge = block.cell_edge;
         let at = |axis: usize, value: f32| (value - block.cell_low[axis]) / edge;
+        if self.packet.any_hit && self.covers(block) {
+            let particles = grid.particles_of(index);
+            return self.run(simd, (particles.start, particles.end), seen, particles.start);
+        }
         let step = if k == 0 { X_STEP } else { 1 };
         let slices = block.cells[k].div_ceil(step);
         for slice in Steps::new(
@@ -208,6 +212,27 @@ impl<S: Simd> Walk<'_, S> {
                 }
             }
         }
+    }
+
+    /// Whether the packet is so wide here that its rows of cells are more than what sixteen-wide culling
+    /// of the whole block takes. Only for rays that do not look for the nearest hit: walking the cells
+    /// finds that one earlier.
+    #[inline(always)]
+    fn covers(&self, block: &Block) -> bool {
+        let [k, u, v] = self.frustum.axes;
+        let ks = (block.low[k], block.high[k]);
+        let radius = block.greatest_radius;
+        let cells = |axis: usize, (low, high): (f32, f32)| {
+            let inside = high.min(block.high[axis]) - low.max(block.low[axis]);
+            (inside / block.cell_edge).max(0.0) + 1.0
+        };
+        let across = cells(u, self.frustum.span(0, ks, radius))
+            * cells(v, self.frustum.span(1, ks, radius))
+            * cells(k, ks);
+        // A row is a run of several cells along x.
+        let rows = across / if k == 0 { X_STEP as f32 } else { 2.0 };
+        let particles: u32 = block.cells.iter().product();
+        rows * LANES as f32 >= particles as f32
     }
 
     /// Culls and tests the particles of a run of cells.
