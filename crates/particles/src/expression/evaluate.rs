@@ -140,11 +140,11 @@ impl Program<'_> {
                 let column = &particles.columns[index];
                 let of = Component { rows, components: column.components, component };
                 match &column.values {
-                    Values::F32(v) => of.load(v, into, |v| f64::from(v)),
+                    Values::F32(v) => of.load(v, into, f64::from),
                     Values::F64(v) => of.load(v, into, |v| v),
-                    Values::I32(v) => of.load(v, into, |v| f64::from(v)),
+                    Values::I32(v) => of.load(v, into, f64::from),
                     Values::I64(v) => of.load(v, into, |v| v as f64),
-                    Values::U8(v) => of.load(v, into, |v| f64::from(v)),
+                    Values::U8(v) => of.load(v, into, f64::from),
                     Values::Names { codes, .. } => of.load(codes, into, |c| f64::from(c) + 1.0),
                 }
             }

@@ -12,7 +12,7 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
 /// So much may come out of any compressed data.
-const FREE_BYTES: u64 = 256 << 20;
+const FREE_BYTES: u64 = 128 << 20;
 /// How many times its size compressed data may take beyond that.
 const MOST_TIMES: u64 = 200;
 /// Size of the blocks that are read of compressed data.
