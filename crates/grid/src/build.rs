@@ -92,6 +92,8 @@ impl Grid {
             z: Vec::new(),
             radius: Radii::Uniform(0.0),
             index: Vec::new(),
+            low: Vec3::INFINITY,
+            high: Vec3::NEG_INFINITY,
             least_radius: 0.0,
             greatest_radius: 0.0,
             crowded: Vec::new(),
@@ -163,6 +165,8 @@ impl Grid {
 
         let occupied = || blocks.iter().filter(|b| b.cells[0] > 0);
         Self {
+            low: occupied().map(|b| b.low).fold(Vec3::INFINITY, Vec3::min),
+            high: occupied().map(|b| b.high).fold(Vec3::NEG_INFINITY, Vec3::max),
             least_radius: occupied().map(|b| b.least_radius).fold(f32::INFINITY, f32::min),
             greatest_radius: occupied().map(|b| b.greatest_radius).fold(0.0, f32::max),
             radius: match radii {

@@ -61,6 +61,10 @@ pub struct Grid {
     pub radius: Radii,
     /// Each particle's index in the file's own order.
     pub index: Vec<u32>,
+    /// Least coordinates of all centres; +∞ without particles.
+    pub low: Vec3,
+    /// Greatest coordinates of all centres; −∞ without particles.
+    pub high: Vec3,
     /// Least radius of all.
     pub least_radius: f32,
     /// Greatest radius of all (r_max of Gribble et al. 2007, §4.1).
@@ -101,14 +105,6 @@ impl Grid {
             Radii::Uniform(r) => *r,
             Radii::Each(radii) => radii[slot],
         }
-    }
-
-    /// The least box around all centres; empty (low above high) without particles.
-    pub fn center_bounds(&self) -> (Vec3, Vec3) {
-        let occupied = self.blocks.iter().filter(|b| b.cells[0] > 0);
-        occupied.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), b| {
-            (low.min(b.low), high.max(b.high))
-        })
     }
 
     /// Bytes of the particle data itself: positions, and radii where they differ.

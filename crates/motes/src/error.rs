@@ -12,6 +12,14 @@ pub enum Error {
     /// The scene makes no sense.
     #[error(transparent)]
     Scene(#[from] motes_scene::SceneError),
+    /// A file's scene makes no sense.
+    #[error("{}: {error}", .path.display())]
+    SceneFile {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong with its scene.
+        error: motes_scene::SceneError,
+    },
     /// A picture could not be written or read.
     #[error(transparent)]
     Frame(#[from] motes_frame::FrameError),
@@ -27,7 +35,7 @@ impl Error {
     /// The exit code: 2 for bad usage, 1 for bad data.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Usage(_) => 2,
+            Self::Scene(_) | Self::SceneFile { .. } | Self::Usage(_) => 2,
             Self::Read(_) | Self::Frame(_) | Self::Cancelled => 1,
         }
     }

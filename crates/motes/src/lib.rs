@@ -14,6 +14,7 @@
 mod annotate;
 mod error;
 mod info;
+mod open;
 mod paint;
 mod picture;
 mod radius;
@@ -24,7 +25,8 @@ mod system;
 pub use error::{Error, Result};
 pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
 pub use motes_frame::Frame;
-pub use motes_scene::Scene;
+pub use motes_scene::{Scene, SceneError};
+pub use open::{BUILT_IN, built_in_scene, is_picture, open, read_scene};
 pub use picture::Picture;
 pub use session::{Layers, Quiet, Session, Watch};
 pub use stats::{Stats, peak_memory_bytes};

@@ -9,6 +9,9 @@ use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, nearest};
 
 use crate::{Error, Result};
 
+/// What `color.by` can be besides the name of a property.
+const WORDS: &[&str] = &["auto", "uniform", "element", "type", "chain"];
+
 /// The colours of one system's particles.
 #[derive(Clone, Debug)]
 pub(crate) struct Paint {
@@ -72,23 +75,29 @@ impl Property {
     /// # Errors
     /// There is no such property; the nearest name is given.
     pub fn find(particles: &Particles, name: &str, component: Component) -> Result<Self> {
-        let own = component_number(component);
-        if let Some(found) = Self::exactly(particles, name, own) {
-            return Ok(found);
-        }
-        if let Some((stem, suffix)) = split_component(name)
-            && let Some(found) = Self::exactly(particles, stem, suffix)
-        {
-            return Ok(found);
-        }
-        let known: Vec<&str> = particles.columns.iter().map(|c| c.name.as_str()).collect();
-        let all = [names::POSITION, names::RADIUS].into_iter().chain(known.iter().copied());
-        let hint = nearest(name, all.clone()).map(|n| format!("; did you mean `{n}`?"));
-        let list = all.collect::<Vec<_>>().join(", ");
-        Err(Error::Usage(format!(
-            "no property `{name}`{}; there are {list}",
-            hint.unwrap_or_default()
-        )))
+        Self::find_or_word(particles, name, component, &[])
+    }
+
+    /// As [`Property::find`], where one of `words` may have been meant instead.
+    fn find_or_word(
+        particles: &Particles,
+        name: &str,
+        component: Component,
+        words: &[&str],
+    ) -> Result<Self> {
+        let suffixed = || {
+            let (stem, suffix) = split_component(name)?;
+            Self::exactly(particles, stem, suffix)
+        };
+        let found = Self::exactly(particles, name, component_number(component)).or_else(suffixed);
+        found.ok_or_else(|| {
+            let known = particles.columns.iter().map(|c| c.name.as_str());
+            let all = [names::POSITION, names::RADIUS].into_iter().chain(known);
+            let near = nearest(name, all.clone().chain(words.iter().copied()));
+            let hint = near.map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default();
+            let list = all.collect::<Vec<_>>().join(", ");
+            Error::Usage(format!("no property `{name}`{hint}; there are {list}"))
+        })
     }
 
     fn exactly(particles: &Particles, name: &str, component: Option<usize>) -> Option<Self> {
@@ -306,7 +315,7 @@ fn by_property(
     name: &str,
     range: Option<[f64; 2]>,
 ) -> Result<(How, Meaning)> {
-    let property = Property::find(particles, name, coloring.component)?;
+    let property = Property::find_or_word(particles, name, coloring.component, WORDS)?;
     if let Property::Column { index, .. } = property
         && let column = &particles.columns[index]
         && let Values::Names { .. } = column.values

@@ -64,7 +64,7 @@ impl Session {
         let pool = pool.transpose().map_err(|e| Error::Usage(format!("threads: {e}")))?;
         let open = |source: &str| match source {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
-            _ => Ok(Series::open(source)?),
+            _ => crate::open(source),
         };
         let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let ranges = vec![None; series.len()];
@@ -138,11 +138,13 @@ impl Session {
         count(&mut stats, &loaded);
         stats.hash = format!("{:016x}", raw.hash());
         stats.peak_memory = peak_memory_bytes();
+        let mut scene = self.scene.clone();
+        scene.image.frame = u32::try_from(frame).unwrap_or(u32::MAX);
         Ok(Picture {
             raw,
             shown,
             stats,
-            scene: self.scene.to_toml(),
+            scene: scene.to_toml(),
             transparent: self.scene.image.transparent,
         })
     }

@@ -8,6 +8,9 @@ use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
 
+/// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
+const MAX_PIXELS: u64 = 1 << 28;
+
 /// A scene that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resolved {
@@ -49,6 +52,10 @@ pub struct Lights {
     pub ground: Vec3,
     /// Light on every surface alike.
     pub ambient: Vec3,
+    /// Directions in which the fill is looked for, for each sample; 0 for none.
+    pub occlusion_rays: u32,
+    /// How far away something keeps the fill from a surface.
+    pub occlusion_radius: f32,
 }
 
 /// A distant round light.
@@ -60,18 +67,21 @@ pub struct KeyLight {
     pub color: Vec3,
     /// Cosine of half the angle across it; 1 for a point.
     pub cos_half_angle: f32,
-    /// Whether it casts shadows.
-    pub shadows: bool,
+    /// Rays towards it for each sample; 0 if it casts no shadows.
+    pub shadow_rays: u32,
 }
 
+/// By default things occlude up to this part of the diagonal of what is visible.
+const OCCLUSION_PART: f64 = 6.0;
+
 impl Lights {
-    /// Fill and ambient light on an unoccluded surface of unit normal `n`: half of each hemisphere's
-    /// weight at the horizon.
+    /// Fill light on an unoccluded surface of unit normal `n`: half of each hemisphere's weight at the
+    /// horizon.
     pub fn fill(&self, n: Vec3) -> Vec3 {
-        self.ground.lerp(self.sky, 0.5 + 0.5 * n.dot(self.up)) + self.ambient
+        self.ground.lerp(self.sky, 0.5 + 0.5 * n.dot(self.up))
     }
 
-    fn new(light: &Light, camera: &Camera, view: &CameraView) -> Self {
+    fn new(light: &Light, camera: &Camera, view: &CameraView, diagonal: f64) -> Self {
         let d = light.direction;
         let direction = match light.relative_to {
             RelativeTo::World => d,
@@ -82,12 +92,14 @@ impl Lights {
                 direction: direction.normalize().as_vec3(),
                 color: Vec3::from(light.color.linear()) * light.intensity as f32,
                 cos_half_angle: (light.softness.to_radians() / 2.0).cos() as f32,
-                shadows: light.shadows,
+                shadow_rays: light.shadow_rays,
             },
             up: camera.up_axis.vector().as_vec3(),
             sky: Vec3::from(light.sky.linear()) * light.fill as f32,
             ground: Vec3::from(light.ground.linear()) * light.fill as f32,
             ambient: Vec3::splat(light.ambient as f32),
+            occlusion_rays: light.occlusion_rays,
+            occlusion_radius: light.occlusion_radius.unwrap_or(diagonal / OCCLUSION_PART) as f32,
         }
     }
 }
@@ -101,7 +113,8 @@ impl Scene {
     pub fn resolve(&self, bounds: Option<Bounds>) -> Result<Resolved> {
         self.check()?;
         let view = CameraView::new(&self.camera, bounds, (self.image.width, self.image.height));
-        let lights = Lights::new(&self.light, &self.camera, &view);
+        let diagonal = bounds.map_or(1.0, |b| b.diagonal());
+        let lights = Lights::new(&self.light, &self.camera, &view, diagonal);
         let bottom = self.image.background_bottom.unwrap_or(self.image.background);
         let background = Background {
             top: Vec3::from(self.image.background.linear()),
@@ -188,6 +201,8 @@ fn check_image(image: &Image) -> Result<()> {
     for (path, size) in [("image.width", image.width), ("image.height", image.height)] {
         need(path, size, (1..=65_535).contains(&size), "1 to 65535 pixels")?;
     }
+    let pixels = u64::from(image.width) * u64::from(image.height);
+    need("image.width × height", pixels, pixels <= MAX_PIXELS, "at most 2^28 pixels in all")?;
     let samples = image.samples;
     need("image.samples", samples, (1..=1024).contains(&samples), "1 to 1024 rays per pixel")?;
     let e = image.exposure;
@@ -204,6 +219,13 @@ fn check_light(light: &Light) -> Result<()> {
     for (path, v) in numbers {
         need(path, v, not_negative(v), "a number, 0 or more")?;
     }
+    for (path, rays) in
+        [("light.shadow_rays", light.shadow_rays), ("light.occlusion_rays", light.occlusion_rays)]
+    {
+        need(path, rays, rays <= 4096, "0 to 4096 rays")?;
+    }
+    let radius = light.occlusion_radius;
+    need("light.occlusion_radius", radius, radius.is_none_or(positive), "a number above 0")?;
     let angle = light.softness;
     need("light.softness", angle, (0.0..=180.0).contains(&angle), "degrees in 0 to 180")
 }
@@ -237,6 +259,7 @@ mod tests {
         for (assignments, path) in [
             (&["camera.fov=0"][..], "camera.fov"),
             (&["camera.fov=180"], "camera.fov"),
+            (&["image.width=65535", "image.height=65535"], "image.width × height"),
             (&["camera.fov=nan"], "camera.fov"),
             (&["camera.up=0,0,0"], "camera.up"),
             (&["camera.position=1,2,inf"], "camera.position"),

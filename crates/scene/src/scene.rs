@@ -125,6 +125,8 @@ settings! {
         width: u32 = 1920,
         /// Height, pixels.
         height: u32 = 1080,
+        /// Which frame of the sources is shown, counted from 0.
+        frame: u32 = 0,
         /// Rays per pixel.
         samples: u32 = 4,
         /// Leaves the background out: alpha 0 where nothing is.
@@ -153,14 +155,18 @@ settings! {
         intensity: f64 = 0.7,
         /// Angle across the key light, degrees: 0 casts hard shadows, 20 soft ones.
         softness: f64 = 12.0,
-        /// Whether the key light casts shadows.
-        shadows: bool = true,
+        /// Rays to the key light for each sample of a pixel: more make soft shadows smoother; 0: it casts none.
+        shadow_rays: u32 = 4,
         /// Colour of the fill from above (the up axis).
         sky: Color = Color::hex(0xffffff),
         /// Colour of the fill from below.
         ground: Color = Color::hex(0xd8d4cf),
         /// Strength of the fill; with the key light's it adds to about 1.
         fill: f64 = 0.45,
+        /// Directions in which the fill is looked for, for each sample of a pixel: crevices are darker; 0: everywhere is open.
+        occlusion_rays: u32 = 16,
+        /// How far something may be to keep fill light away, in world units; none: a sixth of the diagonal of what is visible.
+        occlusion_radius: Option<f64> = None => "1.0",
         /// Light from everywhere alike, which no shape shows.
         ambient: f64 = 0.0,
     }

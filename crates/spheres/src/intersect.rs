@@ -12,7 +12,7 @@ use glam::Vec3;
 use motes_grid::Grid;
 
 use crate::frustum::Frustum;
-use crate::packet::{LANES, NO_SLOT, Packet};
+use crate::packet::{BLOCKED, LANES, NO_SLOT, Packet};
 
 /// A sphere, and where it lies.
 #[derive(Clone, Copy)]
@@ -32,19 +32,20 @@ pub(crate) fn intersect<S: Simd>(
     sphere: Sphere,
     index_of: &dyn Fn(u32) -> u32,
 ) -> bool {
-    let [cx, cy, cz] = sphere.center.to_array().map(|v| f32x16::splat(simd, v));
+    let center = sphere.center;
+    let cx = f32x16::splat(simd, center.x);
+    let cy = f32x16::splat(simd, center.y);
+    let cz = f32x16::splat(simd, center.z);
     let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
     let zero = f32x16::splat(simd, 0.0);
     let mut any = false;
     for first in (0..packet.lanes()).step_by(LANES) {
-        let at = first..first + LANES;
-        let load = |from: &[f32]| f32x16::from_slice(simd, &from[at.clone()]);
-        let [dx, dy, dz] = [0, 1, 2].map(|a| load(&packet.direction[a]));
-        let (ox, oy, oz) = (
-            cx - load(&packet.origin[0]),
-            cy - load(&packet.origin[1]),
-            cz - load(&packet.origin[2]),
-        );
+        let dx = load(simd, &packet.direction[0], first);
+        let dy = load(simd, &packet.direction[1], first);
+        let dz = load(simd, &packet.direction[2], first);
+        let ox = cx - load(simd, &packet.origin[0], first);
+        let oy = cy - load(simd, &packet.origin[1], first);
+        let oz = cz - load(simd, &packet.origin[2], first);
         let b = oz.mul_add_precise(dz, oy.mul_add_precise(dy, ox * dx));
         let minus_b = -b;
         let px = minus_b.mul_add_precise(dx, ox);
@@ -58,16 +59,25 @@ pub(crate) fn intersect<S: Simd>(
         let half = inside.max(zero).sqrt();
         let entry = b - half;
         let distance = entry.simd_gt(zero).select(entry, b + half);
-        let before = load(&packet.distance);
+        let before = load(simd, &packet.distance, first);
         let hit = meets & distance.simd_gt(zero);
         let nearer = hit & distance.simd_lt(before);
         let ties = (hit & distance.simd_eq(before)).to_bitmask();
+        if packet.any_hit {
+            if nearer.any_true() {
+                any = true;
+                let blocked = nearer.select(splat(simd, BLOCKED), before);
+                blocked.store_slice(&mut packet.distance[first..first + LANES]);
+            }
+            continue;
+        }
         if nearer.any_true() {
             any = true;
+            let at = first..first + LANES;
             nearer.select(distance, before).store_slice(&mut packet.distance[at.clone()]);
             let slots = u32x16::from_slice(simd, &packet.slot[at.clone()]);
             let slot = u32x16::splat(simd, sphere.slot);
-            nearer.select(slot, slots).store_slice(&mut packet.slot[at.clone()]);
+            nearer.select(slot, slots).store_slice(&mut packet.slot[at]);
         }
         if ties != 0 {
             break_ties(packet, sphere.slot, (first, ties), index_of);
@@ -97,9 +107,9 @@ pub(crate) fn farthest<S: Simd>(simd: S, packet: &Packet, frustum: &Frustum) -> 
     let sign = f32x16::splat(simd, frustum.sign);
     let mut farthest = f32x16::splat(simd, f32::NEG_INFINITY);
     for first in (0..packet.lanes()).step_by(LANES) {
-        let load = |from: &[f32]| f32x16::from_slice(simd, &from[first..first + LANES]);
-        let d = load(&packet.direction[k]);
-        let reach = load(&packet.distance).mul_add(d, load(&packet.origin[k]));
+        let d = load(simd, &packet.direction[k], first);
+        let o = load(simd, &packet.origin[k], first);
+        let reach = load(simd, &packet.distance, first).mul_add(d, o);
         farthest = farthest.max(reach * sign);
     }
     farthest.reduce_max()
@@ -108,7 +118,7 @@ pub(crate) fn farthest<S: Simd>(simd: S, packet: &Packet, frustum: &Frustum) -> 
 /// The frustum as sixteen-lane constants, to cull sixteen spheres at a time.
 #[derive(Clone, Copy)]
 pub(crate) struct Cull<S: Simd> {
-    at_zero: [f32x16<S>; 4],
+    at_start: [f32x16<S>; 4],
     slope: [f32x16<S>; 4],
     widen: [f32x16<S>; 2],
     pad: f32x16<S>,
@@ -118,13 +128,15 @@ pub(crate) struct Cull<S: Simd> {
 impl<S: Simd> Cull<S> {
     #[inline(always)]
     pub fn new(simd: S, frustum: &Frustum) -> Self {
-        let splat = |v| f32x16::splat(simd, v);
+        let [a0, a1, a2, a3] = frustum.at_start;
+        let [s0, s1, s2, s3] = frustum.slope;
+        let [w0, w1] = frustum.widen;
         Self {
-            at_zero: frustum.at_start.map(splat),
-            slope: frustum.slope.map(splat),
-            widen: frustum.widen.map(splat),
-            pad: splat(frustum.pad),
-            sign: splat(frustum.sign),
+            at_start: [splat(simd, a0), splat(simd, a1), splat(simd, a2), splat(simd, a3)],
+            slope: [splat(simd, s0), splat(simd, s1), splat(simd, s2), splat(simd, s3)],
+            widen: [splat(simd, w0), splat(simd, w1)],
+            pad: splat(simd, frustum.pad),
+            sign: splat(simd, frustum.sign),
         }
     }
 }
@@ -142,10 +154,11 @@ pub(crate) fn cull<S: Simd>(
     (grid, slot): (&Grid, usize),
     reach: f32,
 ) -> u64 {
-    let [k, u, v] = frustum.axes.map(|axis| {
-        let from = [&grid.x, &grid.y, &grid.z][axis];
-        sixteen(simd, from, slot)
-    });
+    let coordinates = [&grid.x, &grid.y, &grid.z];
+    let [k, u, v] = frustum.axes;
+    let k = sixteen(simd, coordinates[k], slot);
+    let u = sixteen(simd, coordinates[u], slot);
+    let v = sixteen(simd, coordinates[v], slot);
     let radius = match &grid.radius {
         motes_grid::Radii::Uniform(r) => f32x16::splat(simd, *r),
         motes_grid::Radii::Each(radii) => sixteen(simd, radii, slot),
@@ -153,12 +166,27 @@ pub(crate) fn cull<S: Simd>(
     let along = k - f32x16::splat(simd, frustum.k_start);
     let u_shift = radius.mul_add(planes.widen[0], planes.pad);
     let v_shift = radius.mul_add(planes.widen[1], planes.pad);
-    let plane = |p: usize| planes.slope[p].mul_add(along, planes.at_zero[p]);
-    let in_u = (u + u_shift).simd_ge(plane(0)) & (u - u_shift).simd_le(plane(1));
-    let in_v = (v + v_shift).simd_ge(plane(2)) & (v - v_shift).simd_le(plane(3));
+    let u_low = planes.slope[0].mul_add(along, planes.at_start[0]);
+    let u_high = planes.slope[1].mul_add(along, planes.at_start[1]);
+    let v_low = planes.slope[2].mul_add(along, planes.at_start[2]);
+    let v_high = planes.slope[3].mul_add(along, planes.at_start[3]);
+    let in_u = (u + u_shift).simd_ge(u_low) & (u - u_shift).simd_le(u_high);
+    let in_v = (v + v_shift).simd_ge(v_low) & (v - v_shift).simd_le(v_high);
     let ahead = (along * planes.sign + radius + planes.pad).simd_ge(f32x16::splat(simd, 0.0));
     let near = (k * planes.sign - radius - planes.pad).simd_le(f32x16::splat(simd, reach));
     (in_u & in_v & ahead & near).to_bitmask()
+}
+
+// Closures and `array::map` would leave the instruction set of their surroundings.
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, from: &[f32], first: usize) -> f32x16<S> {
+    f32x16::from_slice(simd, &from[first..first + LANES])
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, value: f32) -> f32x16<S> {
+    f32x16::splat(simd, value)
 }
 
 /// Sixteen values from `at` on; past the end the last one repeats.

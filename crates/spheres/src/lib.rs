@@ -13,6 +13,7 @@
 
 mod frustum;
 mod intersect;
+mod occlude;
 mod packet;
 pub mod reference;
 mod render;

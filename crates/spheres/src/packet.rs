@@ -9,6 +9,9 @@ pub const MOST_RAYS: usize = 256;
 /// The slot of a ray that has hit nothing of the current system.
 pub const NO_SLOT: u32 = u32::MAX;
 
+/// The distance of a ray that has met something and looks no further.
+pub(crate) const BLOCKED: f32 = -1.0;
+
 /// Up to 256 rays, coordinate by coordinate, and each one's nearest hit.
 ///
 /// # Invariants
@@ -17,6 +20,8 @@ pub const NO_SLOT: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 pub struct Packet {
     pub(crate) rays: usize,
+    /// Whether any hit ends a ray, not only the nearest.
+    pub(crate) any_hit: bool,
     pub(crate) origin: [[f32; MOST_RAYS]; 3],
     pub(crate) direction: [[f32; MOST_RAYS]; 3],
     /// Distance of the nearest hit; +∞ for none.
@@ -34,6 +39,7 @@ impl Packet {
     pub fn new() -> Self {
         Self {
             rays: 0,
+            any_hit: false,
             origin: [[0.0; MOST_RAYS]; 3],
             direction: [[0.0; MOST_RAYS]; 3],
             distance: [f32::INFINITY; MOST_RAYS],
@@ -43,9 +49,16 @@ impl Packet {
         }
     }
 
-    /// Removes all rays and hits.
+    /// Removes all rays and hits; the rays to come look for what is nearest.
     pub fn clear(&mut self) {
         self.rays = 0;
+        self.any_hit = false;
+    }
+
+    /// Removes all rays and hits; the rays to come only ask whether there is anything.
+    pub fn clear_for_any_hit(&mut self) {
+        self.rays = 0;
+        self.any_hit = true;
     }
 
     /// Adds a ray; `direction` has unit length.
@@ -53,12 +66,20 @@ impl Packet {
     /// # Panics
     /// If the packet is full.
     pub fn push(&mut self, origin: Vec3, direction: Vec3) {
+        self.push_within(origin, direction, f32::INFINITY);
+    }
+
+    /// Adds a ray that looks no farther than `reach`.
+    ///
+    /// # Panics
+    /// If the packet is full.
+    pub fn push_within(&mut self, origin: Vec3, direction: Vec3, reach: f32) {
         let i = self.rays;
         for axis in 0..3 {
             self.origin[axis][i] = origin[axis];
             self.direction[axis][i] = direction[axis];
         }
-        self.distance[i] = f32::INFINITY;
+        self.distance[i] = reach;
         self.hit_slot[i] = NO_SLOT;
         self.rays += 1;
     }
@@ -120,9 +141,15 @@ impl Packet {
             .then(|| (self.distance[i], self.hit_system[i], self.hit_slot[i]))
     }
 
+    /// Whether ray `i` of an any-hit packet has met something.
+    pub fn is_blocked(&self, i: usize) -> bool {
+        self.distance[i] == BLOCKED
+    }
+
     /// Ray `i` alone.
     pub(crate) fn single(&self, i: usize) -> Self {
         let mut one = Self::new();
+        one.any_hit = self.any_hit;
         one.push(self.origin_of(i), self.direction_of(i));
         one.distance[0] = self.distance[i];
         one.slot[0] = self.slot[i];

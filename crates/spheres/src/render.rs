@@ -6,6 +6,7 @@ use glam::Vec3;
 use motes_scene::{Lights, Rays};
 use rayon::prelude::*;
 
+use crate::occlude::{Point, hash, reaching};
 use crate::packet::{MOST_RAYS, Packet};
 use crate::shade::{Paint, shade};
 use crate::traverse::{Counts, Spheres, trace};
@@ -159,8 +160,10 @@ fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area)
     let offsets = sample_offsets(settings.samples);
     let side = (settings.packet / (settings.samples as f32).sqrt().ceil() as u32).max(1);
     let weight = 1.0 / settings.samples as f32;
+    let mut hits: Vec<(usize, Point, Surface)> = Vec::new();
+    let mut points = Vec::new();
     for part in area.parts(side) {
-        for some in offsets.chunks(MOST_RAYS / (side * side) as usize) {
+        for (chunk, some) in offsets.chunks(MOST_RAYS / (side * side) as usize).enumerate() {
             packet.clear();
             for (x, y) in part.pixels() {
                 for [dx, dy] in some {
@@ -169,17 +172,23 @@ fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area)
                 }
             }
             trace(simd, &mut packet, view.systems, &mut tile.counts);
+            hits.clear();
             for (i, pixel) in part.pixels().enumerate() {
-                let sum = &mut tile.color[place(pixel)];
-                for ray in i * some.len()..(i + 1) * some.len() {
-                    if let Some(hit) = Surface::of(&packet, ray, view.systems) {
-                        let albedo = view.paint.color(hit.system, hit.index);
-                        let light = shade(view.lights, albedo, hit.normal) * weight;
-                        for (sum, light) in sum.iter_mut().zip([light.x, light.y, light.z, weight])
-                        {
-                            *sum += light;
-                        }
-                    }
+                for j in 0..some.len() {
+                    let sample = (chunk * MOST_RAYS + j) as u32;
+                    let surface = Surface::of(&packet, i * some.len() + j, view.systems);
+                    hits.extend(surface.map(|s| (place(pixel), s.point(pixel, sample), s)));
+                }
+            }
+            points.clear();
+            points.extend(hits.iter().map(|hit| Point { of: settings.samples, ..hit.1 }));
+            let reaching = reaching(simd, &points, view.lights, view.systems, &mut tile.counts);
+            for ((place, _, surface), reaching) in hits.iter().zip(reaching) {
+                let albedo = view.paint.color(surface.system, surface.index);
+                let light = shade(view.lights, albedo, surface.normal, reaching) * weight;
+                let sum = &mut tile.color[*place];
+                for (sum, light) in sum.iter_mut().zip([light.x, light.y, light.z, weight]) {
+                    *sum += light;
                 }
             }
         }
@@ -212,6 +221,8 @@ fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area)
 /// The surface a ray has hit.
 struct Surface {
     distance: f32,
+    position: Vec3,
+    radius: f32,
     /// Unit normal, towards where the ray came from.
     normal: Vec3,
     index: u32,
@@ -223,11 +234,20 @@ impl Surface {
         let (distance, system, slot) = packet.hit(ray)?;
         let (grid, place) = systems[system as usize].locate(slot);
         let direction = packet.direction_of(ray);
-        let outward = packet.origin_of(ray) + direction * distance - grid.center(place);
+        let position = packet.origin_of(ray) + direction * distance;
+        let (outward, radius) = (position - grid.center(place), grid.radius_at(place));
         // Rounding cannot flip it: a grazing ray's normal is at a right angle to the ray at most.
-        let inside = (grid.center(place) - packet.origin_of(ray)).length() < grid.radius_at(place);
+        let inside = (grid.center(place) - packet.origin_of(ray)).length() < radius;
         let normal = outward.normalize_or(-direction) * if inside { -1.0 } else { 1.0 };
-        Some(Self { distance, normal, index: grid.index[place], system })
+        Some(Self { distance, position, radius, normal, index: grid.index[place], system })
+    }
+
+    /// The point where secondary rays start.
+    fn point(&self, (x, y): (u32, u32), sample: u32) -> Point {
+        // A thousandth of the radius, and what rounding of the coordinates may add to it.
+        let lift = 1e-3 * self.radius + 1e-6 * (self.position.abs().max_element() + self.distance);
+        let seed = hash(x ^ hash(y));
+        Point { position: self.position, normal: self.normal, lift, sample, of: 1, seed }
     }
 }
 

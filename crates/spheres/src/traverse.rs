@@ -91,8 +91,7 @@ const X_STEP: u32 = 4;
 #[simd]
 fn trace_grid<S: Simd>(simd: S, packet: &mut Packet, room: Room<'_>, counts: &mut Counts) {
     let grid = room.grid;
-    let (low, high) = grid.center_bounds();
-    match Frustum::around(packet, low, high, grid.greatest_radius) {
+    match Frustum::around(packet, grid.low, grid.high, grid.greatest_radius) {
         Bounds::Nothing => {}
         Bounds::Incoherent => {
             for i in 0..packet.rays {

@@ -1,7 +1,7 @@
-//! A file as a stream of bytes, decompressed on the way.
+//! A file, or bytes that are built in, as a stream, decompressed on the way.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::inflate;
@@ -47,10 +47,16 @@ impl Head<'_> {
     }
 }
 
+/// Where stored bytes come from.
+trait Stored: Read + Seek + Send {}
+impl<T: Read + Seek + Send> Stored for T {}
+
 /// An open file. Cheap to hold: nothing but the head stays in memory.
 #[derive(Debug)]
 pub struct Input {
     path: PathBuf,
+    /// The content, where it is built in and no file.
+    built_in: Option<&'static [u8]>,
     name: String,
     compression: Compression,
     stored_bytes: u64,
@@ -65,13 +71,28 @@ impl Input {
     /// The file cannot be opened or read, is a directory, or its compressed data is broken from the
     /// first byte on.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::new(path, None)
+    }
+
+    /// Content that is built into the program, under the name that errors and formats see.
+    ///
+    /// # Errors
+    /// Its compressed data is broken.
+    pub fn of_bytes(name: &str, bytes: &'static [u8]) -> Result<Self> {
+        Self::new(Path::new(name), Some(bytes))
+    }
+
+    fn new(path: &Path, built_in: Option<&'static [u8]>) -> Result<Self> {
         let io = |e: std::io::Error| ReadError::io(path, &e);
-        let mut file = File::open(path).map_err(io)?;
-        let stored_bytes = file.metadata().map_err(io)?.len();
+        let mut stored = stored(path, built_in).map_err(io)?;
+        let stored_bytes = match built_in {
+            Some(bytes) => bytes.len() as u64,
+            None => std::fs::metadata(path).map_err(io)?.len(),
+        };
         let mut magic = [0; 4];
         let mut seen = 0;
         while seen < 4 {
-            match file.read(&mut magic[seen..]).map_err(io)? {
+            match stored.read(&mut magic[seen..]).map_err(io)? {
                 0 => break,
                 n => seen += n,
             }
@@ -87,8 +108,8 @@ impl Input {
             Compression::None => name,
             _ => name.trim_end_matches(".gz").trim_end_matches(".zst").to_owned(),
         };
-        let mut input =
-            Self { path: path.into(), name, compression, stored_bytes, head: vec![], whole: false };
+        let (path, head, whole) = (path.into(), vec![], false);
+        let mut input = Self { path, built_in, name, compression, stored_bytes, head, whole };
         let (head, broken) = input.start(HEAD_BYTES + 1)?;
         input.whole = head.len() as u64 <= HEAD_BYTES && broken.is_none();
         input.head = head;
@@ -123,14 +144,14 @@ impl Input {
     /// The file cannot be opened, or ends before `offset` in a broken stream.
     pub fn stream(&self, offset: u64) -> Result<Box<dyn Read + Send>> {
         let io = |e: std::io::Error| ReadError::io(&self.path, &e);
-        let mut file = File::open(&self.path).map_err(io)?;
+        let mut stored = stored(&self.path, self.built_in).map_err(io)?;
         let mut stream: Box<dyn Read + Send> = match self.compression {
             Compression::None => {
-                file.seek(SeekFrom::Start(offset)).map_err(io)?;
-                return Ok(Box::new(file));
+                stored.seek(SeekFrom::Start(offset)).map_err(io)?;
+                return Ok(Box::new(stored));
             }
-            Compression::Gzip => inflate::gzip(file),
-            Compression::Zstd => inflate::zstd(file),
+            Compression::Gzip => inflate::gzip(stored),
+            Compression::Zstd => inflate::zstd(stored),
         };
         std::io::copy(&mut stream.by_ref().take(offset), &mut std::io::sink()).map_err(io)?;
         Ok(stream)
@@ -170,4 +191,11 @@ impl Input {
             .map_err(|e| ReadError::io(&self.path, &e))?;
         Ok(out)
     }
+}
+
+fn stored(path: &Path, built_in: Option<&'static [u8]>) -> std::io::Result<Box<dyn Stored>> {
+    Ok(match built_in {
+        Some(bytes) => Box::new(Cursor::new(bytes)),
+        None => Box::new(File::open(path)?),
+    })
 }

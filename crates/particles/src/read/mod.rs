@@ -130,7 +130,15 @@ pub static FORMATS: &[&dyn Format] = &[
 /// # Errors
 /// The file cannot be read, is empty, or no format recognises it.
 pub fn open(path: &Path) -> Result<(&'static str, Box<dyn Reader>)> {
-    let input = Input::open(path)?;
+    open_input(Input::open(path)?)
+}
+
+/// Opens `input` as [`open`] does.
+///
+/// # Errors
+/// It is empty, or no format recognises it.
+pub fn open_input(input: Input) -> Result<(&'static str, Box<dyn Reader>)> {
+    let path = input.path();
     if input.head().bytes.is_empty() {
         return Err(ReadError::new(path, Place::Whole, "the file is empty"));
     }
