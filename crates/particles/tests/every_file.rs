@@ -11,7 +11,7 @@ use motes_particles::read::{Wanted, open};
 const FORMATS: [(&str, &[&str]); 9] = [
     ("LAMMPS dump", &[".dump", ".lammpstrj", ".dump.gz"]),
     ("XYZ", &[".xyz", ".extxyz", ".xyz.gz", ".xyz.zst", ".but.not.really"]),
-    ("PDB", &[".pdb"]),
+    ("PDB", &[".pdb", ".pdb.gz"]),
     ("PLY", &[".ply"]),
     ("NPY", &[".npy"]),
     ("NPZ", &[".npz"]),

@@ -51,7 +51,7 @@ const TEXTS: [(&str, &str); 8] = [
 ];
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
     out.write_all(bytes).unwrap();
     out.finish().unwrap()
 }
@@ -89,7 +89,7 @@ fn npy_header(rows: u64) -> Vec<u8> {
 
 /// An archive of one deflated array.
 fn npz(content: &[u8]) -> Vec<u8> {
-    let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
+    let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::best());
     deflated.write_all(content).unwrap();
     let data = deflated.finish().unwrap();
     let name = b"position.npy";
