@@ -9,10 +9,11 @@
 use fearless_simd::Simd;
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_scene::{KeyLight, Lights};
+use motes_scene::KeyLight;
 
-use crate::packet::{MOST_RAYS, Packet};
-use crate::traverse::{Counts, Spheres, trace};
+use crate::packet::Packet;
+use crate::render::View;
+use crate::traverse::{Counts, trace};
 
 /// A point of a surface and the random numbers that are its own.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +21,8 @@ pub(crate) struct Point {
     pub position: Vec3,
     /// Unit normal, towards the viewer.
     pub normal: Vec3,
+    /// Distance from the eye.
+    pub depth: f32,
     /// How far from the surface rays start, so as not to meet it again by rounding.
     pub lift: f32,
     /// Which of the `of` samples of its pixel it belongs to, and a hash of the pixel.
@@ -37,71 +40,130 @@ pub(crate) struct Reaching {
     pub fill: f32,
 }
 
-/// Traces the shadow and occlusion rays of up to [`MOST_RAYS`] points.
+/// Traces the shadow and occlusion rays of the points of a tile.
+///
+/// Points that lie together in space and belong to the same sample make a packet: their rays go the
+/// same way. Packets by pixels alone would tear at every depth discontinuity.
 #[simd]
 pub(crate) fn reaching<S: Simd>(
     simd: S,
     points: &[Point],
-    lights: &Lights,
-    systems: &[Spheres<'_>],
+    view: View<'_>,
     counts: &mut Counts,
 ) -> Vec<Reaching> {
-    let mut all: Vec<Reaching> =
-        points.iter().map(|p| Reaching { key: open_key(&lights.key, p), fill: 1.0 }).collect();
-    let mut sums = vec![(0.0f32, 0.0f32); points.len()];
+    let lights = view.lights;
+    let open = |p: &Point| Reaching { key: open_key(&lights.key, p), fill: 1.0 };
+    let mut all: Vec<Reaching> = points.iter().map(open).collect();
+    if lights.key.shadow_rays == 0 && lights.occlusion_rays == 0 {
+        return all;
+    }
     let mut rays = Rays::new();
-
-    let count = lights.key.shadow_rays;
-    for ray in 0..count {
-        let aim = |p: &Point| Some(key_direction(&lights.key, p, (ray, count)));
-        rays.gather(points, aim, f32::INFINITY);
-        trace(simd, &mut rays.packet, systems, counts);
-        rays.scatter(&mut sums);
-    }
-    if count > 0 {
-        for (reaching, sum) in all.iter_mut().zip(&mut sums) {
-            reaching.key = sum.0 / count as f32;
-            *sum = (0.0, 0.0);
+    let mut sums = [(0.0, 0.0); PACKET_POINTS];
+    for group in groups(points, view.rays) {
+        let sums = &mut sums[..group.len()];
+        let count = lights.key.shadow_rays;
+        if count > 0 {
+            sums.fill((0.0, 0.0));
+            for ray in 0..count {
+                let aim = |p: &Point| key_direction(&lights.key, p, (ray, count));
+                rays.gather(points, &group, aim, f32::INFINITY);
+                trace(simd, &mut rays.packet, view.systems, counts);
+                rays.scatter(sums);
+            }
+            for (i, sum) in group.iter().zip(&*sums) {
+                all[*i as usize].key = sum.0 / count as f32;
+            }
         }
-    }
-
-    for ray in 0..lights.occlusion_rays {
-        let aim = |p: &Point| Some(fill_direction(p, (ray, lights.occlusion_rays)));
-        rays.gather(points, aim, lights.occlusion_radius);
-        trace(simd, &mut rays.packet, systems, counts);
-        rays.scatter(&mut sums);
-    }
-    if lights.occlusion_rays > 0 {
-        for (reaching, sum) in all.iter_mut().zip(&sums) {
-            // No direction above the surface says nothing: open.
-            reaching.fill = if sum.1 > 0.0 { sum.0 / sum.1 } else { 1.0 };
+        let count = lights.occlusion_rays;
+        if count > 0 {
+            sums.fill((0.0, 0.0));
+            for ray in 0..count {
+                let aim = |p: &Point| fill_direction(p, (ray, count));
+                rays.gather(points, &group, aim, lights.occlusion_radius);
+                trace(simd, &mut rays.packet, view.systems, counts);
+                rays.scatter(sums);
+            }
+            for (i, sum) in group.iter().zip(&*sums) {
+                // No direction above the surface says nothing: open.
+                all[*i as usize].fill = if sum.1 > 0.0 { sum.0 / sum.1 } else { 1.0 };
+            }
         }
     }
     all
 }
 
+/// Points of a packet of secondary rays.
+const PACKET_POINTS: usize = 64;
+/// Edge of the cells that points are sorted by, in pixels at their distance: as many samples of one
+/// index as a packet has points lie in one cell of a surface seen face on.
+const CELL_PIXELS: f32 = 8.0;
+
+/// The points in groups that belong to the same sample and lie together.
+fn groups(points: &[Point], rays: &motes_scene::Rays) -> Vec<Vec<u32>> {
+    let low = points.iter().map(|p| p.position).fold(Vec3::INFINITY, Vec3::min);
+    let depth = points.iter().map(|p| p.depth).fold(f32::INFINITY, f32::min);
+    let cell = match rays.projection {
+        motes_scene::Projection::Perspective => rays.pixel * depth,
+        motes_scene::Projection::Orthographic => rays.pixel,
+    } * CELL_PIXELS;
+    let key = |p: &Point| {
+        // 10 bits an axis; farther cells share the last.
+        let at = ((p.position - low) / cell).to_array().map(|v| (v as u32).min(1023));
+        u64::from(p.sample) << 32
+            | u64::from(spread(at[0]) | spread(at[1]) << 1 | spread(at[2]) << 2)
+    };
+    let mut order: Vec<(u64, u32)> =
+        points.iter().enumerate().map(|(i, p)| (key(p), i as u32)).collect();
+    order.sort_unstable();
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    let mut before = u64::MAX;
+    for (key, i) in order {
+        // Neighbours within a block of 2³ cells may share a packet.
+        match groups.last_mut() {
+            Some(group) if key >> 3 == before && group.len() < PACKET_POINTS => group.push(i),
+            _ => groups.push(vec![i]),
+        }
+        before = key >> 3;
+    }
+    groups
+}
+
+/// The ten bits of `v`, two zeros between each.
+fn spread(v: u32) -> u32 {
+    let v = (v | v << 16) & 0x0300_00ff;
+    let v = (v | v << 8) & 0x0300_f00f;
+    let v = (v | v << 4) & 0x030c_30c3;
+    (v | v << 2) & 0x0924_9249
+}
+
 /// A packet of secondary rays, and whose they are.
 struct Rays {
     packet: Box<Packet>,
-    owner: [u16; MOST_RAYS],
-    cosine: [f32; MOST_RAYS],
+    owner: [u16; PACKET_POINTS],
+    cosine: [f32; PACKET_POINTS],
 }
 
 impl Rays {
     fn new() -> Self {
         let packet = Box::new(Packet::new());
-        Self { packet, owner: [0; MOST_RAYS], cosine: [0.0; MOST_RAYS] }
+        Self { packet, owner: [0; PACKET_POINTS], cosine: [0.0; PACKET_POINTS] }
     }
 
-    /// Starts a ray at every point whose direction lies above its surface.
-    fn gather(&mut self, points: &[Point], aim: impl Fn(&Point) -> Option<Vec3>, reach: f32) {
+    /// Starts a ray at every point of the group whose direction lies above its surface.
+    fn gather(
+        &mut self,
+        points: &[Point],
+        group: &[u32],
+        aim: impl Fn(&Point) -> Vec3,
+        reach: f32,
+    ) {
         self.packet.clear_for_any_hit();
-        for (i, point) in points.iter().enumerate() {
-            let Some(direction) = aim(point) else { continue };
+        for (owner, point) in group.iter().map(|i| &points[*i as usize]).enumerate() {
+            let direction = aim(point);
             let cosine = direction.dot(point.normal);
             if cosine > 0.0 {
                 let ray = self.packet.len();
-                self.owner[ray] = i as u16;
+                self.owner[ray] = owner as u16;
                 self.cosine[ray] = cosine;
                 let origin = point.position + point.normal * point.lift;
                 self.packet.push_within(origin, direction, reach);
@@ -201,7 +263,7 @@ mod tests {
     }
 
     fn point(sample: u32, seed: u32) -> Point {
-        Point { position: Vec3::ZERO, normal: Vec3::Z, lift: 0.0, sample, of: 4, seed }
+        Point { position: Vec3::ZERO, normal: Vec3::Z, depth: 1.0, lift: 0.0, sample, of: 4, seed }
     }
 
     #[test]

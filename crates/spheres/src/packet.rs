@@ -123,7 +123,8 @@ impl Packet {
 
     /// Begins a system: no ray has hit it yet.
     pub(crate) fn begin_system(&mut self) {
-        self.slot.fill(NO_SLOT);
+        let lanes = self.lanes();
+        self.slot[..lanes].fill(NO_SLOT);
         self.pad();
     }
 

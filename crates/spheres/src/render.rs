@@ -160,7 +160,7 @@ fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area)
     let offsets = sample_offsets(settings.samples);
     let side = (settings.packet / (settings.samples as f32).sqrt().ceil() as u32).max(1);
     let weight = 1.0 / settings.samples as f32;
-    let mut hits: Vec<(usize, Point, Surface)> = Vec::new();
+    let mut hits: Vec<(usize, Surface)> = Vec::new();
     let mut points = Vec::new();
     for part in area.parts(side) {
         for (chunk, some) in offsets.chunks(MOST_RAYS / (side * side) as usize).enumerate() {
@@ -172,25 +172,25 @@ fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area)
                 }
             }
             trace(simd, &mut packet, view.systems, &mut tile.counts);
-            hits.clear();
             for (i, pixel) in part.pixels().enumerate() {
                 for j in 0..some.len() {
-                    let sample = (chunk * MOST_RAYS + j) as u32;
-                    let surface = Surface::of(&packet, i * some.len() + j, view.systems);
-                    hits.extend(surface.map(|s| (place(pixel), s.point(pixel, sample), s)));
+                    let ray = i * some.len() + j;
+                    if let Some(surface) = Surface::of(&packet, ray, view.systems) {
+                        let sample = (chunk * MOST_RAYS + j) as u32;
+                        points.push(surface.point(pixel, (sample, settings.samples)));
+                        hits.push((place(pixel), surface));
+                    }
                 }
             }
-            points.clear();
-            points.extend(hits.iter().map(|hit| Point { of: settings.samples, ..hit.1 }));
-            let reaching = reaching(simd, &points, view.lights, view.systems, &mut tile.counts);
-            for ((place, _, surface), reaching) in hits.iter().zip(reaching) {
-                let albedo = view.paint.color(surface.system, surface.index);
-                let light = shade(view.lights, albedo, surface.normal, reaching) * weight;
-                let sum = &mut tile.color[*place];
-                for (sum, light) in sum.iter_mut().zip([light.x, light.y, light.z, weight]) {
-                    *sum += light;
-                }
-            }
+        }
+    }
+    let reaching = reaching(simd, &points, view, &mut tile.counts);
+    for ((place, surface), reaching) in hits.iter().zip(reaching) {
+        let albedo = view.paint.color(surface.system, surface.index);
+        let light = shade(view.lights, albedo, surface.normal, reaching) * weight;
+        let sum = &mut tile.color[*place];
+        for (sum, light) in sum.iter_mut().zip([light.x, light.y, light.z, weight]) {
+            *sum += light;
         }
     }
 
@@ -243,11 +243,12 @@ impl Surface {
     }
 
     /// The point where secondary rays start.
-    fn point(&self, (x, y): (u32, u32), sample: u32) -> Point {
+    fn point(&self, (x, y): (u32, u32), (sample, of): (u32, u32)) -> Point {
         // A thousandth of the radius, and what rounding of the coordinates may add to it.
         let lift = 1e-3 * self.radius + 1e-6 * (self.position.abs().max_element() + self.distance);
         let seed = hash(x ^ hash(y));
-        Point { position: self.position, normal: self.normal, lift, sample, of: 1, seed }
+        let (position, normal, depth) = (self.position, self.normal, self.distance);
+        Point { position, normal, depth, lift, sample, of, seed }
     }
 }
 
