@@ -11,7 +11,7 @@ use motes_particles::read::{Wanted, open};
 const FORMATS: [(&str, &[&str]); 9] = [
     ("LAMMPS dump", &[".dump", ".lammpstrj", ".dump.gz"]),
     ("XYZ", &[".xyz", ".extxyz", ".xyz.gz", ".xyz.zst", ".but.not.really"]),
-    ("PDB", &[".pdb"]),
+    ("PDB", &[".pdb", ".pdb.gz"]),
     ("PLY", &[".ply"]),
     ("NPY", &[".npy"]),
     ("NPZ", &[".npz"]),
@@ -31,8 +31,8 @@ const REFUSED: [&str; 11] = [
     "diamond_with_bool.ply",
     "numpy/complex.npy",
     "numpy/objects.npy",
-    "numpy/no_positions.npz",
-    "numpy/scalar.npy",
+    "numpy/objects.npz",
+    "numpy/one_dimension.npy",
 ];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {

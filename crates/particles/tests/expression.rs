@@ -56,11 +56,14 @@ fn particles(count: usize, random: &mut Random) -> Particles {
     }
 }
 
+/// The value of a property for a row.
+type Value = Box<dyn Fn(&Particles, usize) -> f64>;
+
 /// An expression as text, tightness of its outermost operator, and its meaning for one row.
 struct Expression {
     text: String,
     tightness: u8,
-    value: Box<dyn Fn(&Particles, usize) -> f64>,
+    value: Value,
     kind: Kind,
 }
 
@@ -102,7 +105,7 @@ fn flag(condition: bool) -> f64 {
 }
 
 fn truth(value: f64) -> bool {
-    value < 0.0 || value > 0.0
+    value.abs() > 0.0
 }
 
 fn property(random: &mut Random) -> Expression {

@@ -51,7 +51,7 @@ const TEXTS: [(&str, &str); 8] = [
 ];
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
     out.write_all(bytes).unwrap();
     out.finish().unwrap()
 }
@@ -89,7 +89,7 @@ fn npy_header(rows: u64) -> Vec<u8> {
 
 /// An archive of one deflated array.
 fn npz(content: &[u8]) -> Vec<u8> {
-    let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
+    let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::best());
     deflated.write_all(content).unwrap();
     let data = deflated.finish().unwrap();
     let name = b"position.npy";
@@ -148,7 +148,9 @@ fn bombs_are_refused_in_bounded_memory() {
         ("bomb.csv", b"x,y,z\n1,2,3\n".to_vec()),
     ];
     for (name, head) in heads {
-        for bomb in [gzip_bomb(&head, b"\0"), gzip_bomb(&head, b"\n"), zstd_bomb(&head, 0)] {
+        let is_text = name.ends_with("xyz") || name.ends_with("csv");
+        let byte = if is_text { b'\n' } else { 0 };
+        for bomb in [gzip_bomb(&head, &[byte]), zstd_bomb(&head, byte)] {
             let error = read_first(&write(name, &bomb)).unwrap_err();
             assert!(error.contains(name) && error.len() > 40, "{error}");
         }
@@ -158,13 +160,13 @@ fn bombs_are_refused_in_bounded_memory() {
     let bomb = gzip_bomb(format!("{many}\n\n{row}").as_bytes(), b"H 1 2 3\n");
     let error = read_first(&write("rows.xyz", &bomb)).unwrap_err();
     assert!(error.contains("inflate"), "{error}");
-    let array = [npy_header(many), vec![0; 512 * MEBIBYTE]].concat();
+    let array = [npy_header(many), vec![0; 256 * MEBIBYTE]].concat();
     let archive = npz(&array);
     drop(array);
     let error = read_first(&write("bomb.npz", &archive)).unwrap_err();
     assert!(error.contains("inflate"), "{error}");
     // What is made to test with counts too.
-    assert!(peak_mebibytes().is_none_or(|peak| peak < 3072), "{:?} MiB", peak_mebibytes());
+    assert!(peak_mebibytes().is_none_or(|peak| peak < 2048), "{:?} MiB", peak_mebibytes());
 }
 
 #[test]

@@ -57,9 +57,7 @@ pub(super) fn dam(count: usize) -> (Vec<[f32; 3]>, f32) {
     let inside =
         |p: &[f32; 3]| p[0] <= 1.0 && p[1] <= 1.0 && (p[2] < SLAB_BOTTOM || above(p) < 0.0);
     let (slab, radius) = lattice.at_least(in_slab, &inside);
-    // What is left out lies at the surface.
-    let height = |p: &[f32; 3]| if p[2] < SLAB_BOTTOM { f64::NEG_INFINITY } else { above(p) };
-    let slab = least(slab, in_slab, &height);
+    let slab = least(slab, in_slab, &above);
     let particle = |i: usize| {
         let place = permuted(ORDER_SEED, count as u64, i as u64);
         slab.get(place as usize).copied().unwrap_or_else(|| spray(place))

@@ -12,9 +12,9 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
 /// So much may come out of any compressed data.
-const FREE_BYTES: u64 = 256 << 20;
+const FREE_BYTES: u64 = 128 << 20;
 /// How many times its size compressed data may take beyond that.
-const MOST_TIMES: u64 = 200;
+const MOST_TIMES: u64 = 100;
 /// Size of the blocks that are read of compressed data.
 const BUFFER_BYTES: usize = 256 * 1024;
 

@@ -431,8 +431,11 @@ struct BadRow {
 
 impl BadRow {
     fn into_stop(self, lines: &Lines) -> Stop {
-        let error = lines.error(self.line, self.message);
-        if self.cut { Stop::Cut(error) } else { Stop::Error(error) }
+        if self.cut {
+            let message = format!("{}, where {}", self.message, lines.end());
+            return Stop::Cut(lines.error(self.line, message));
+        }
+        Stop::Error(lines.error(self.line, self.message))
     }
 }
 

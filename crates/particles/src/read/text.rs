@@ -166,10 +166,14 @@ impl Lines {
 
     /// An error about what is missing at the end of the file.
     pub(super) fn cut(&self, expected: &str) -> ReadError {
-        let why = self.broken().map_or("the file ends".to_owned(), |why| {
+        self.error(self.line, format!("expected {expected}, but {}", self.end()))
+    }
+
+    /// What the file's end is: that, or the end of sound compressed data.
+    pub(super) fn end(&self) -> String {
+        self.broken().map_or("the file ends".to_owned(), |why| {
             format!("the compressed data ends early ({why})")
-        });
-        self.error(self.line, format!("expected {expected}, but {why}"))
+        })
     }
 
     /// Goes to a line whose mark was taken before.

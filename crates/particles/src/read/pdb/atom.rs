@@ -1,6 +1,7 @@
 //! `ATOM` and `HETATM` lines: columns to values.
 
 use super::fields::{OVERFLOWED, columns, number, numbers, real, trim};
+use super::first_line;
 use crate::read::dictionary::Dictionary;
 use crate::read::elements::symbol;
 use crate::read::text::{Wrong, shown};
@@ -78,7 +79,8 @@ impl Atoms {
     pub(super) fn parse(text: &[u8], wanted: &Wanted) -> Result<Self, Wrong> {
         let mut atoms = Self::default();
         let mut at = 0;
-        for line in text.split_inclusive(|b| *b == b'\n') {
+        while at < text.len() {
+            let line = first_line(&text[at..]);
             if is_atom(line) {
                 let line = line.trim_ascii_end();
                 atoms.push(line, wanted).map_err(|message| Wrong { at, message })?;

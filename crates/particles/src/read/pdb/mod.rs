@@ -107,6 +107,11 @@ fn frame_end(line: &[u8]) -> Option<bool> {
     }
 }
 
+/// The first line of what is not empty, with its end.
+fn first_line(text: &[u8]) -> &[u8] {
+    memchr::memchr(b'\n', text).map_or(text, |end| &text[..=end])
+}
+
 /// The part of a block up to a frame's end.
 struct Part<'a> {
     block: Block<'a>,
@@ -117,7 +122,8 @@ struct Part<'a> {
 /// Cuts the block that starts at `start` behind the line that ends the frame.
 fn cut<'a>(block: Block<'a>, start: Mark) -> Part<'a> {
     let (mut bytes, mut lines, mut is_end) = (0, 0, false);
-    for line in block.bytes.split_inclusive(|b| *b == b'\n') {
+    while bytes < block.bytes.len() {
+        let line = first_line(&block.bytes[bytes..]);
         let end = if matches!(line[0], b'E' | b'M') { frame_end(line) } else { None };
         is_end = end.is_some();
         if end == Some(false) {
@@ -153,9 +159,12 @@ impl PdbLayout {
             // A last line that the file's end cut short.
             let is_last = !part.block.bytes.ends_with(b"\n") && !is_end;
             if let Err((line, message)) = each(&part.block) {
-                let error = lines.error(line, message);
-                let is_cut = is_last && line + 1 == end.line;
-                return Err(if is_cut { Stop::Cut(error) } else { Stop::Error(error) });
+                return Err(match is_last && line + 1 == end.line {
+                    true => {
+                        Stop::Cut(lines.error(line, format!("{message}, where {}", lines.end())))
+                    }
+                    false => Stop::Error(lines.error(line, message)),
+                });
             }
             if is_end {
                 return Ok(lines.go_to(end)?);
