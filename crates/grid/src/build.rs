@@ -278,10 +278,10 @@ fn sort_into_buckets(
     let mut rest = &mut items[..];
     for bucket in 0..buckets {
         bucket_starts.push(start);
-        for chunk in 0..CHUNKS {
-            let (piece, after) = rest.split_at_mut(counts[chunk][bucket]);
+        for (counts, pieces) in counts.iter().zip(&mut pieces) {
+            let (piece, after) = rest.split_at_mut(counts[bucket]);
             start += piece.len();
-            pieces[chunk].push(piece.iter_mut());
+            pieces.push(piece.iter_mut());
             rest = after;
         }
     }

@@ -187,7 +187,7 @@ fn filters_show_what_brute_force_shows() {
             Filter { value: &by_x, ranges: &x_ranges, min: low, max: high },
             Filter { value: &by_value, ranges: &value_ranges, min: 0.2, max: 0.9 },
         ];
-        let keep = |i: u32| i % 7 != 0;
+        let keep = |i: u32| !i.is_multiple_of(7);
         let visibility = Visibility::where_all(&grid, &filters, Some(&keep));
         let expected: Vec<u32> = (0..30_000u32)
             .filter(|i| (low..=high).contains(&by_x(*i)) && (0.2..=0.9).contains(&by_value(*i)))

@@ -10,7 +10,7 @@ use motes_particles::read::{Wanted, open};
 
 const MEBIBYTE: usize = 1 << 20;
 /// How much the bombs inflate to.
-const BOMB_MEBIBYTES: usize = 4096;
+const BOMB_MEBIBYTES: usize = 512;
 
 /// A small file of each text format.
 const TEXTS: [(&str, &str); 8] = [

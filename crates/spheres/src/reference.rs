@@ -28,7 +28,7 @@ pub fn distance(origin: DVec3, direction: DVec3, sphere: Sphere) -> Option<f64> 
     let b = oc.dot(direction) / direction.length();
     let perpendicular = (oc - direction.normalize() * b).length_squared();
     let inside = sphere.radius * sphere.radius - perpendicular;
-    if !(sphere.radius > 0.0) || inside < 0.0 {
+    if sphere.radius.is_nan() || sphere.radius <= 0.0 || inside < 0.0 {
         return None;
     }
     let half = inside.sqrt();
