@@ -6,7 +6,7 @@
 //! - [`Packet`]: rays and their nearest hits
 //! - [`trace`]: a packet through the grids of the systems
 //! - [`render`]: a whole picture, tile by tile, on all cores
-//! - [`reference`]: brute force in f64, the definition; for tests
+//! - [`mod@reference`]: brute force in f64, the definition; for tests
 //!
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
 //! threads, the size of packets or of tiles.
