@@ -6,8 +6,8 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Background, Curve, Frame, Layer, Tone};
-use motes_particles::Series;
 use motes_particles::read::{Wanted, names};
+use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, RangeOver, Resolved, Scene, Show};
 use motes_spheres::{Center, Settings, Spheres, View};
 
@@ -114,13 +114,7 @@ impl Session {
         stats.ms.insert("read", milliseconds(start));
 
         let start = Instant::now();
-        let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
-        let mut loaded = Vec::new();
-        for (i, particles) in particles.into_iter().enumerate() {
-            let Some(particles) = particles else { continue };
-            let of = (&self.scene, &self.scene.system[i]);
-            loaded.push(Loaded::new(particles, of, (i as u16, origin), self.ranges[i])?);
-        }
+        let (loaded, origin) = self.load(particles)?;
         stats.ms.insert("build", milliseconds(start));
 
         let resolved = self.scene.resolve(bounds(&loaded, origin, self.scene.overlay.r#box))?;
@@ -149,12 +143,49 @@ impl Session {
         })
     }
 
-    /// Reads the frame of every visible system; `None` for hidden ones.
-    fn read(
+    /// Fixes the camera for a film: what is visible in the first, the middle and the last of `frames`
+    /// is framed, and stays so from then on. A position and target of the scene's own stay as they are.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn hold_view(
         &mut self,
-        frame: usize,
+        frames: std::ops::RangeInclusive<usize>,
         watch: &dyn Watch,
-    ) -> Result<Vec<Option<Arc<motes_particles::Particles>>>> {
+    ) -> Result<()> {
+        let (first, last) = (*frames.start(), *frames.end());
+        let mut looks = vec![first, first + last.saturating_sub(first) / 2, last];
+        looks.dedup();
+        let mut framed: Option<Bounds> = None;
+        for frame in looks {
+            let particles = self.read(frame, watch)?;
+            let (loaded, origin) = self.load(particles)?;
+            let here = bounds(&loaded, origin, self.scene.overlay.r#box);
+            framed = framed.into_iter().chain(here).reduce(Bounds::union);
+        }
+        let view = self.scene.resolve(framed)?.view;
+        let camera = &mut self.scene.camera;
+        camera.position.get_or_insert(view.eye);
+        camera.target.get_or_insert(view.target);
+        camera.up.get_or_insert(view.up);
+        camera.height.get_or_insert(2.0 * view.half_height);
+        Ok(())
+    }
+
+    /// Builds the grids and colours of what was read, about the returned origin.
+    fn load(&self, particles: Vec<Option<Arc<Particles>>>) -> Result<(Vec<Loaded>, DVec3)> {
+        let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
+        let mut loaded = Vec::new();
+        for (i, particles) in particles.into_iter().enumerate() {
+            let Some(particles) = particles else { continue };
+            let of = (&self.scene, &self.scene.system[i]);
+            loaded.push(Loaded::new(particles, of, (i as u16, origin), self.ranges[i])?);
+        }
+        Ok((loaded, origin))
+    }
+
+    /// Reads the frame of every visible system; `None` for hidden ones.
+    fn read(&mut self, frame: usize, watch: &dyn Watch) -> Result<Vec<Option<Arc<Particles>>>> {
         let report = |done, total| _ = watch.progress("read", done, total);
         let mut all = Vec::new();
         for i in 0..self.series.len() {

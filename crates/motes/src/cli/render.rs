@@ -181,6 +181,9 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             (last, last)
         }
     };
+    if first < last {
+        session.hold_view(first..=last, &meter)?;
+    }
     for frame in first..=last {
         let start = Instant::now();
         let picture = session.render(frame, plan.files.layers_wanted(), &meter)?;
@@ -203,6 +206,10 @@ impl Args {
         let mut scene = self.base()?;
         self.edit(&mut scene)?;
         let frames = self.frame.unwrap_or(Frames::One(scene.image.frame as usize));
+        if matches!(frames, Frames::Range(..)) {
+            // The same colour means the same value all through a film.
+            scene.set("system.color.range_over", "series").map_err(motes::Error::from)?;
+        }
         let files = Files {
             picture: self.output.clone(),
             layers: self.layers.clone(),
