@@ -2,9 +2,10 @@
 //!
 //! Gribble et al. 2007, §4.3, "Soft Shadows": rays from the hits of a packet to samples of an area
 //! light, in packets of their own. The rays of one packet aim at the same part of the light, each at
-//! its own point of it; all are any-hit. Ambient occlusion does the same with the whole sphere of
-//! directions cut into as many parts of equal area as there are rays, of which those above the surface
-//! count with the cosine.
+//! its own point of it; all are any-hit. Ambient occlusion goes along directions that cut the sphere
+//! into parts of equal area, of which those above the surface count with the cosine. All rays of a
+//! packet share one direction, so that the packet stays as narrow as its points lie together however
+//! far it goes; neighbouring pixels, two by two, have directions of their own.
 
 use fearless_simd::Simd;
 use fearless_simd_macros::simd;
@@ -25,9 +26,12 @@ pub(crate) struct Point {
     pub depth: f32,
     /// How far from the surface rays start, so as not to meet it again by rounding.
     pub lift: f32,
-    /// Which of the `of` samples of its pixel it belongs to, and a hash of the pixel.
+    /// Which of the `of` samples of its pixel it belongs to.
     pub sample: u32,
     pub of: u32,
+    /// Place of its pixel in a square of two by two.
+    pub quarter: u32,
+    /// A hash of its pixel.
     pub seed: u32,
 }
 
@@ -61,8 +65,9 @@ pub(crate) fn reaching<S: Simd>(
     let mut sums = [(0.0, 0.0); PACKET_POINTS];
     let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
     for group in groups(points, view.rays) {
-        // All points of a group belong to the same sample of their pixels.
-        let Some(Point { sample, of, .. }) = group.first().map(|i| points[*i as usize]) else {
+        // All points of a group belong to the same sample, in the same quarter.
+        let Some(Point { sample, of, quarter, .. }) = group.first().map(|i| points[*i as usize])
+        else {
             continue;
         };
         let sums = &mut sums[..group.len()];
@@ -85,9 +90,8 @@ pub(crate) fn reaching<S: Simd>(
             sums.fill((0.0, 0.0));
             for ray in 0..count {
                 let place = (ray * of + sample, count * of);
-                let part = fill_part(place);
-                let aim = |p: &Point| fill_direction(&part, p, place.0);
-                rays.gather(points, &group, aim, lights.occlusion_radius);
+                let direction = fill_direction(place, quarter);
+                rays.gather(points, &group, |_| direction, lights.occlusion_radius);
                 trace(simd, &mut rays.packet, view.systems, counts);
                 rays.scatter(sums);
             }
@@ -102,11 +106,11 @@ pub(crate) fn reaching<S: Simd>(
 
 /// Points of a packet of secondary rays.
 const PACKET_POINTS: usize = 64;
-/// Edge of the cells that points are sorted by, in pixels at their distance: as many samples of one
-/// index as a packet has points lie in one cell of a surface seen face on.
-const CELL_PIXELS: f32 = 8.0;
+/// Edge of the cells that points are sorted by, in pixels at their distance: as many points of one
+/// sample and quarter as a packet takes lie in one cell of a surface seen face on.
+const CELL_PIXELS: f32 = 16.0;
 
-/// The points in groups that belong to the same sample and lie together.
+/// The points in groups that belong to the same sample and quarter and lie together.
 fn groups(points: &[Point], rays: &motes_scene::Rays) -> Vec<Vec<u32>> {
     let low = points.iter().map(|p| p.position).fold(Vec3::INFINITY, Vec3::min);
     let depth = points.iter().map(|p| p.depth).fold(f32::INFINITY, f32::min);
@@ -242,18 +246,12 @@ fn key_direction(light: &Cap, point: &Point, (place, places): (u32, u32)) -> Vec
     light.direction(area, place as f32 * GOLDEN_TURN + unit(hash(point.seed)))
 }
 
-/// Part `place` of `places` of the sphere: parts of equal area along a Fibonacci spiral, the same for
-/// every pixel.
-fn fill_part((place, places): (u32, u32)) -> Cap {
-    let area = (place as f32 + 0.5) / places as f32;
-    let middle = Cap::new(Vec3::Z, -1.0).direction(area, place as f32 * GOLDEN_TURN);
-    Cap::new(middle, 1.0 - 2.0 / places as f32)
-}
-
-/// A point's own direction within a part of the sphere.
-fn fill_direction(part: &Cap, point: &Point, place: u32) -> Vec3 {
-    let random = hash(point.seed ^ place.wrapping_mul(0x9e37_79b9));
-    part.direction(unit(random), unit(hash(random)))
+/// Direction `place` of `places` over the sphere, for pixels of one quarter: the middles of parts of
+/// equal area along a Fibonacci spiral. The directions of the four quarters lie between each other.
+fn fill_direction((place, places): (u32, u32), quarter: u32) -> Vec3 {
+    let between = (quarter as f32 + 0.5) / 4.0;
+    let area = (place as f32 + between) / places as f32;
+    Cap::new(Vec3::Z, -1.0).direction(area, (place as f32 + between) * GOLDEN_TURN)
 }
 
 /// A hash whose every bit depends on every bit of `x` (C. Wellons, "lowbias32").
@@ -293,17 +291,12 @@ mod tests {
     fn fill_directions_cover_the_sphere_evenly() {
         // The mean of max(0, n·d) over the sphere is 1/4, of d itself zero.
         let all: Vec<Vec3> = (0..4)
-            .flat_map(|sample| {
-                (0..16).map(move |ray| {
-                    let place = (ray * 4 + sample, 64);
-                    fill_direction(&fill_part(place), &point(sample, 7), place.0)
-                })
-            })
+            .flat_map(|quarter| (0..64).map(move |place| fill_direction((place, 64), quarter)))
             .collect();
-        let mean = all.iter().sum::<Vec3>() / 64.0;
-        assert!(mean.length() < 0.05, "{mean}");
+        let mean = all.iter().sum::<Vec3>() / 256.0;
+        assert!(mean.length() < 0.02, "{mean}");
         for normal in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE.normalize()] {
-            let cosine = all.iter().map(|d| d.dot(normal).max(0.0)).sum::<f32>() / 64.0;
+            let cosine = all.iter().map(|d| d.dot(normal).max(0.0)).sum::<f32>() / 256.0;
             assert!((cosine - 0.25).abs() < 0.02, "{normal}: {cosine}");
         }
         assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-5));

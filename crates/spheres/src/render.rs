@@ -248,7 +248,8 @@ impl Surface {
         let lift = 1e-3 * self.radius + 1e-6 * (self.position.abs().max_element() + self.distance);
         let seed = hash(x ^ hash(y));
         let (position, normal, depth) = (self.position, self.normal, self.distance);
-        Point { position, normal, depth, lift, sample, of, seed }
+        let quarter = x % 2 + y % 2 * 2;
+        Point { position, normal, depth, lift, sample, of, quarter, seed }
     }
 }
 

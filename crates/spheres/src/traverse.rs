@@ -245,7 +245,10 @@ impl<S: Simd> Walk<'_, S> {
             if let Seen::Mixed(words) = seen {
                 may &= bits(words, slot - block_first);
                 if may == 0 {
-                    slot += count;
+                    // On to the next word that has a bit.
+                    let word = (slot + count - block_first) / 64;
+                    let empty = words[word..].iter().take_while(|w| **w == 0).count();
+                    slot = (slot + count).max(block_first + (word + empty) * 64);
                     continue;
                 }
             }
