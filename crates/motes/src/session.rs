@@ -8,11 +8,11 @@ use glam::{DVec3, Vec3};
 use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, ColorBy, RangeOver, Resolved, Scene, Show};
+use motes_scene::{Bounds, ColorBy, Framing, RangeOver, Resolved, Scene, Show};
 use motes_spheres::{Center, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations, frames_box};
-use crate::paint::{Property, split_component};
+use crate::paint::{Meaning, Property, split_component};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
 use crate::system::Loaded;
@@ -26,6 +26,9 @@ pub enum Layers {
     /// All of them.
     Yes,
 }
+
+/// Room for a legend, in heights of its text.
+const LEGEND_EMS: f64 = 8.0;
 
 /// Is told of long work, from any thread.
 pub trait Watch: Sync {
@@ -117,7 +120,8 @@ impl Session {
         let (loaded, origin) = self.load(particles)?;
         stats.ms.insert("build", milliseconds(start));
 
-        let resolved = self.scene.resolve(bounds(&loaded, origin, self.scene.overlay.r#box))?;
+        let boxes = framed(&loaded, origin, self.scene.overlay.r#box);
+        let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth.
         let show_box = self.scene.overlay.r#box;
         let layers =
@@ -156,20 +160,29 @@ impl Session {
         let (first, last) = (*frames.start(), *frames.end());
         let mut looks = vec![first, first + last.saturating_sub(first) / 2, last];
         looks.dedup();
-        let mut framed: Option<Bounds> = None;
+        let (mut boxes, mut last) = (Vec::new(), Vec::new());
         for frame in looks {
             let particles = self.read(frame, watch)?;
             let (loaded, origin) = self.load(particles)?;
-            let here = bounds(&loaded, origin, self.scene.overlay.r#box);
-            framed = framed.into_iter().chain(here).reduce(Bounds::union);
+            boxes.extend(framed(&loaded, origin, self.scene.overlay.r#box));
+            last = loaded;
         }
-        let view = self.scene.resolve(framed)?.view;
+        let view = self.scene.resolve_framing(self.framing(&last, &boxes))?.view;
         let camera = &mut self.scene.camera;
         camera.position.get_or_insert(view.eye);
         camera.target.get_or_insert(view.target);
         camera.up.get_or_insert(view.up);
         camera.height.get_or_insert(2.0 * view.half_height);
         Ok(())
+    }
+
+    /// What the camera shows: all of `boxes`, beside the legend where there is one.
+    fn framing<'a>(&self, loaded: &[Loaded], boxes: &'a [Bounds]) -> Framing<'a> {
+        let image = &self.scene.image;
+        let legend = self.scene.overlay.legend != Show::Off
+            && loaded.iter().any(|l| !matches!(l.paint.meaning, Meaning::Nothing));
+        let text = self.scene.overlay.text_size * f64::from(image.height) / f64::from(image.width);
+        Framing { boxes, free_right: if legend { LEGEND_EMS * text } else { 0.0 } }
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
@@ -330,13 +343,13 @@ fn series_range(
     Ok(range)
 }
 
-/// The box around all that is to be framed.
-fn bounds(loaded: &[Loaded], origin: DVec3, show_box: Show) -> Option<Bounds> {
+/// Boxes around all that is to be framed.
+fn framed(loaded: &[Loaded], origin: DVec3, show_box: Show) -> Vec<Bounds> {
     let of_box = |l: &Loaded| {
         let corners = l.particles.sim_box.filter(|_| frames_box(&l.particles, show_box))?.corners();
         Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
     };
-    loaded.iter().flat_map(|l| [l.bounds(origin), of_box(l)]).flatten().reduce(Bounds::union)
+    loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l))).collect()
 }
 
 fn with_layers(frame: Frame, center: &[Center], loaded: &[Loaded]) -> Result<Frame> {

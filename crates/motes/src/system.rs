@@ -57,12 +57,19 @@ impl Loaded {
         self.visible.iter().map(Visibility::visible).sum()
     }
 
-    /// The box around what is visible, with radii, in world coordinates.
-    pub fn bounds(&self, origin: DVec3) -> Option<Bounds> {
-        let boxes = self.classes.grids.iter().zip(&self.visible);
-        let bounds = boxes.filter_map(|(grid, visible)| visible_bounds(grid, visible));
-        let (low, high) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-        Some(Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin))
+    /// Boxes around what is visible, with radii, in world coordinates.
+    pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
+        let mut boxes = Vec::new();
+        for (grid, visible) in self.classes.grids.iter().zip(&self.visible) {
+            let blocks = 0..grid.blocks.len() - 1;
+            let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
+            boxes.extend(
+                seen.map(|(low, high)| {
+                    Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)
+                }),
+            );
+        }
+        boxes
     }
 }
 
@@ -107,35 +114,27 @@ fn visibility(
     Ok(classes.grids.iter().map(of_grid).collect())
 }
 
-/// The box around the visible spheres of a grid.
-fn visible_bounds(grid: &Grid, visible: &Visibility) -> Option<(Vec3, Vec3)> {
-    let mut bounds: Option<(Vec3, Vec3)> = None;
-    let mut include = |low: Vec3, high: Vec3| {
-        let (a, b) = bounds.unwrap_or((low, high));
-        bounds = Some((a.min(low), b.max(high)));
-    };
-    for index in 0..grid.blocks.len() - 1 {
-        match visible.block(grid, index) {
-            Seen::Hidden => {}
-            // The block's greatest radius would be wrong only by less than its class's spread;
-            // where radii differ, each sphere is asked.
-            Seen::Shown if grid.least_radius == grid.greatest_radius => {
-                let block = &grid.blocks[index];
-                include(block.low - grid.greatest_radius, block.high + grid.greatest_radius);
-            }
-            seen => {
-                for (i, slot) in grid.particles_of(index).enumerate() {
-                    let shown = match seen {
-                        Seen::Mixed(words) => words[i / 64] >> (i % 64) & 1 == 1,
-                        _ => true,
-                    };
-                    if shown {
-                        let (center, radius) = (grid.center(slot), grid.radius_at(slot));
-                        include(center - radius, center + radius);
-                    }
-                }
-            }
+/// The box around the visible spheres of a block.
+fn block_bounds(grid: &Grid, visible: &Visibility, index: usize) -> Option<(Vec3, Vec3)> {
+    let seen = visible.block(grid, index);
+    let block = &grid.blocks[index];
+    match seen {
+        Seen::Hidden => None,
+        Seen::Shown if block.least_radius == block.greatest_radius => {
+            Some((block.low - block.greatest_radius, block.high + block.greatest_radius))
         }
+        // Where radii differ, each sphere is asked.
+        _ => grid
+            .particles_of(index)
+            .enumerate()
+            .filter(|(i, _)| match seen {
+                Seen::Mixed(words) => words[i / 64] >> (i % 64) & 1 == 1,
+                _ => true,
+            })
+            .map(|(_, slot)| {
+                let (center, radius) = (grid.center(slot), grid.radius_at(slot));
+                (center - radius, center + radius)
+            })
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
     }
-    bounds
 }

@@ -97,14 +97,25 @@ const DIRECTION: DVec3 = DVec3::new(2.0, 1.0, -1.0);
 /// Least distance from the eye to what is framed, as a part of its diagonal.
 const CLEARANCE: f64 = 0.05;
 
+/// What a camera that is free to choose shows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Framing<'a> {
+    /// Boxes around all that is to be seen; the more there are, the closer the fit. None: a unit box
+    /// about the world's origin.
+    pub boxes: &'a [Bounds],
+    /// Part of the picture's width that is kept free at the right, for a legend.
+    pub free_right: f64,
+}
+
 impl CameraView {
-    /// The view of `camera` on a picture of `size` (width, height) pixels, framing `bounds` as far as
-    /// position and target leave it open; without bounds, a unit box about the world's origin.
+    /// The view of `camera` on a picture of `size` (width, height) pixels, framing what `framing` says
+    /// as far as position and target leave it open.
     ///
     /// `camera` is taken to be checked, see [`crate::Scene::resolve`]. An `up` along the looking
     /// direction is replaced by an axis that is not.
-    pub fn new(camera: &Camera, bounds: Option<Bounds>, size: (u32, u32)) -> Self {
-        let bounds = framed(bounds);
+    pub fn new(camera: &Camera, framing: Framing<'_>, size: (u32, u32)) -> Self {
+        let whole = framing.boxes.iter().copied().reduce(Bounds::union);
+        let bounds = framed(whole);
         let forward = match (camera.position, camera.target, camera.direction) {
             (Some(p), Some(t), _) => t - p,
             (Some(p), None, None) if p != bounds.center() => bounds.center() - p,
@@ -125,10 +136,14 @@ impl CameraView {
             width: size.0,
             height: size.1,
         };
-        let corners = bounds.corners().map(|c| view.in_view(c));
+        // A box that had to be given an extent stands for all.
+        let boxes = if whole == Some(bounds) { framing.boxes } else { &[bounds] };
+        let corners: Vec<DVec3> =
+            boxes.iter().flat_map(Bounds::corners).map(|c| view.in_view(c)).collect();
+        let free = framing.free_right.clamp(0.0, 0.4);
         match camera.projection {
-            Projection::Perspective => view.stand_perspective(camera, &bounds, &corners),
-            Projection::Orthographic => view.stand_orthographic(camera, &bounds, &corners),
+            Projection::Perspective => view.stand_perspective(camera, &bounds, (&corners, free)),
+            Projection::Orthographic => view.stand_orthographic(camera, &bounds, (&corners, free)),
         }
         view
     }
@@ -147,8 +162,14 @@ impl CameraView {
         f64::from(self.width) / f64::from(self.height)
     }
 
-    /// Places the eye of a perspective; `corners` are those of `bounds`, in view axes.
-    fn stand_perspective(&mut self, camera: &Camera, bounds: &Bounds, corners: &[DVec3; 8]) {
+    /// Places the eye of a perspective; `corners` are those of all boxes, in view axes, and a part
+    /// `free` of the width stays free at the right.
+    fn stand_perspective(
+        &mut self,
+        camera: &Camera,
+        bounds: &Bounds,
+        (corners, free): (&[DVec3], f64),
+    ) {
         let tan_y = self.half_height * (1.0 - camera.margin);
         let (tan_x, near) = (tan_y * self.aspect(), CLEARANCE * bounds.diagonal());
         let center_depth = bounds.center().dot(self.forward);
@@ -165,16 +186,22 @@ impl CameraView {
                 target - self.forward * distance
             }
             (None, None) => {
-                let (x, zx) = fit(corners, 0, tan_x);
-                let (y, zy) = fit(corners, 1, tan_y);
-                self.in_world(DVec3::new(x, y, zx.min(zy).min(nearest)))
+                let x = Fit::new(corners, 0, (tan_x, tan_x * (1.0 - 2.0 * free)));
+                let y = Fit::new(corners, 1, (tan_y, tan_y));
+                let depth = x.depth().min(y.depth()).min(nearest);
+                self.in_world(DVec3::new(x.across(depth), y.across(depth), depth))
             }
         };
         self.target = camera.target.unwrap_or_else(|| self.on_axis(center_depth, bounds));
     }
 
     /// Places the eye of an orthographic view before all of `bounds`, and takes its height.
-    fn stand_orthographic(&mut self, camera: &Camera, bounds: &Bounds, corners: &[DVec3; 8]) {
+    fn stand_orthographic(
+        &mut self,
+        camera: &Camera,
+        bounds: &Bounds,
+        (corners, free): (&[DVec3], f64),
+    ) {
         let [(x0, x1), (y0, y1)] = [0, 1].map(|axis| {
             let along = corners.iter().map(|c| c[axis]);
             (along.clone().fold(f64::INFINITY, f64::min), along.fold(f64::NEG_INFINITY, f64::max))
@@ -184,7 +211,12 @@ impl CameraView {
             let target = camera.target.map_or(center, |t| self.in_view(t));
             let (x, y) = match camera.target {
                 Some(_) => (target.x, target.y),
-                None => (f64::midpoint(x0, x1), f64::midpoint(y0, y1)),
+                None => {
+                    let wide = (x1 - x0) / (2.0 * self.aspect() * (1.0 - free));
+                    let half_height = (0.5 * (y1 - y0)).max(wide) / (1.0 - camera.margin);
+                    let aside = half_height * self.aspect() * free;
+                    (f64::midpoint(x0, x1) + aside, f64::midpoint(y0, y1))
+                }
             };
             // A whole diagonal before the centre: every corner is in front.
             let depth = target.z.min(center.z) - bounds.diagonal();
@@ -263,12 +295,31 @@ impl Rays {
     }
 }
 
-/// Where an eye must stand, across (along `axis` of view axes) and in depth, for the corners to just
-/// fill the angle whose half has this tangent: |c − eye| ≤ tan·(depth − eye's) for every corner c.
-fn fit(corners: &[DVec3; 8], axis: usize, tan: f64) -> (f64, f64) {
-    let left = corners.iter().map(|c| c[axis] + tan * c.z).fold(f64::INFINITY, f64::min);
-    let right = corners.iter().map(|c| c[axis] - tan * c.z).fold(f64::NEG_INFINITY, f64::max);
-    (f64::midpoint(left, right), (left - right) / (2.0 * tan))
+/// Where an eye may stand, along one axis of the view and in depth, for all corners c to lie in the angle
+/// between the tangents −`tan.0` and `tan.1`: −tan.0·d ≤ c − eye ≤ tan.1·d with d = depth − eye's depth.
+struct Fit {
+    tan: (f64, f64),
+    /// The least c + tan.0·depth and the greatest c − tan.1·depth.
+    low: f64,
+    high: f64,
+}
+
+impl Fit {
+    fn new(corners: &[DVec3], axis: usize, tan: (f64, f64)) -> Self {
+        let low = corners.iter().map(|c| c[axis] + tan.0 * c.z).fold(f64::INFINITY, f64::min);
+        let high = corners.iter().map(|c| c[axis] - tan.1 * c.z).fold(f64::NEG_INFINITY, f64::max);
+        Self { tan, low, high }
+    }
+
+    /// The greatest depth from which there is such a place.
+    fn depth(&self) -> f64 {
+        (self.low - self.high) / (self.tan.0 + self.tan.1)
+    }
+
+    /// The middle of such places at `depth`.
+    fn across(&self, depth: f64) -> f64 {
+        f64::midpoint(self.low - self.tan.0 * depth, self.high + self.tan.1 * depth)
+    }
 }
 
 /// The box to frame: never without extent.

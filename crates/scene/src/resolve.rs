@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::bounds::Bounds;
-use crate::camera::CameraView;
+use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
@@ -111,8 +111,17 @@ impl Scene {
     /// # Errors
     /// As [`Scene::check`].
     pub fn resolve(&self, bounds: Option<Bounds>) -> Result<Resolved> {
+        self.resolve_framing(Framing { boxes: bounds.as_slice(), free_right: 0.0 })
+    }
+
+    /// As [`Scene::resolve`], framing boxes around parts of what is visible (with radii).
+    ///
+    /// # Errors
+    /// As [`Scene::check`].
+    pub fn resolve_framing(&self, framing: Framing<'_>) -> Result<Resolved> {
         self.check()?;
-        let view = CameraView::new(&self.camera, bounds, (self.image.width, self.image.height));
+        let bounds = framing.boxes.iter().copied().reduce(Bounds::union);
+        let view = CameraView::new(&self.camera, framing, (self.image.width, self.image.height));
         let diagonal = bounds.map_or(1.0, |b| b.diagonal());
         let lights = Lights::new(&self.light, &self.camera, &view, diagonal);
         let bottom = self.image.background_bottom.unwrap_or(self.image.background);

@@ -121,7 +121,7 @@ fn groups(points: &[Point], rays: &motes_scene::Rays) -> Vec<Vec<u32>> {
     let key = |p: &Point| {
         // 10 bits an axis; farther cells share the last.
         let at = ((p.position - low) / cell).to_array().map(|v| (v as u32).min(1023));
-        u64::from(p.sample) << 32
+        u64::from(p.sample * 4 + p.quarter) << 32
             | u64::from(spread(at[0]) | spread(at[1]) << 1 | spread(at[2]) << 2)
     };
     let mut order: Vec<(u64, u32)> =
@@ -284,7 +284,16 @@ mod tests {
     }
 
     fn point(sample: u32, seed: u32) -> Point {
-        Point { position: Vec3::ZERO, normal: Vec3::Z, depth: 1.0, lift: 0.0, sample, of: 4, seed }
+        Point {
+            position: Vec3::ZERO,
+            normal: Vec3::Z,
+            depth: 1.0,
+            lift: 0.0,
+            sample,
+            of: 4,
+            quarter: 0,
+            seed,
+        }
     }
 
     #[test]
