@@ -156,7 +156,7 @@ settings! {
         /// Angle across the key light, degrees: 0 casts hard shadows, 20 soft ones.
         softness: f64 = 12.0,
         /// Rays to the key light for each sample of a pixel: more make soft shadows smoother; 0: it casts none.
-        shadow_rays: u32 = 2,
+        shadow_rays: u32 = 1,
         /// Colour of the fill from above (the up axis).
         sky: Color = Color::hex(0xffffff),
         /// Colour of the fill from below.
@@ -164,7 +164,7 @@ settings! {
         /// Strength of the fill; with the key light's it adds to about 1.
         fill: f64 = 0.45,
         /// Directions in which the fill is looked for, for each sample of a pixel: crevices are darker; 0: everywhere is open.
-        occlusion_rays: u32 = 8,
+        occlusion_rays: u32 = 4,
         /// How far something may be to keep fill light away, in world units; none: a sixth of the diagonal of what is visible.
         occlusion_radius: Option<f64> = None => "1.0",
         /// Light from everywhere alike, which no shape shows.

@@ -31,8 +31,19 @@ pub(crate) struct Point {
     pub of: u32,
     /// Place of its pixel in a square of two by two.
     pub quarter: u32,
+    /// That square.
+    pub square: (u32, u32),
+    /// The sphere it lies on: system and index.
+    pub sphere: (u16, u32),
     /// A hash of its pixel.
     pub seed: u32,
+}
+
+impl Point {
+    /// What points have in common that share what they see.
+    fn near(&self) -> impl Ord {
+        (self.square, self.sample, self.sphere)
+    }
 }
 
 /// What reaches a point, as parts of what would reach it in the open.
@@ -56,13 +67,16 @@ pub(crate) fn reaching<S: Simd>(
     counts: &mut Counts,
 ) -> Vec<Reaching> {
     let lights = view.lights;
+    let (key_rays, fill_rays) = (lights.key.shadow_rays, lights.occlusion_rays);
     let open = |p: &Point| Reaching { key: open_key(&lights.key, p), fill: 1.0 };
     let mut all: Vec<Reaching> = points.iter().map(open).collect();
-    if lights.key.shadow_rays == 0 && lights.occlusion_rays == 0 {
+    if key_rays == 0 && fill_rays == 0 {
         return all;
     }
     let mut rays = Rays::new();
-    let mut sums = [(0.0, 0.0); PACKET_POINTS];
+    // Sums of visible cosines and of all cosines, per point.
+    let mut keys = vec![(0.0, 0.0); points.len()];
+    let mut fills = vec![(0.0, 0.0); points.len()];
     let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
     for group in groups(points, view.rays) {
         // All points of a group belong to the same sample, in the same quarter.
@@ -70,38 +84,57 @@ pub(crate) fn reaching<S: Simd>(
         else {
             continue;
         };
-        let sums = &mut sums[..group.len()];
-        let count = lights.key.shadow_rays;
-        if count > 0 {
-            sums.fill((0.0, 0.0));
-            for ray in 0..count {
-                let place = (ray * of + sample, count * of);
-                let aim = |p: &Point| key_direction(&light, p, place);
-                rays.gather(points, &group, aim, f32::INFINITY);
-                trace(simd, &mut rays.packet, view.systems, counts);
-                rays.scatter(sums);
-            }
-            for (i, sum) in group.iter().zip(&*sums) {
-                all[*i as usize].key = sum.0 / count as f32;
-            }
+        for ray in 0..key_rays {
+            let place = (ray * of + sample, key_rays * of);
+            rays.gather(points, &group, |p| key_direction(&light, p, place), f32::INFINITY);
+            trace(simd, &mut rays.packet, view.systems, counts);
+            rays.scatter(&group, &mut keys);
         }
-        let count = lights.occlusion_rays;
-        if count > 0 {
-            sums.fill((0.0, 0.0));
-            for ray in 0..count {
-                let place = (ray * of + sample, count * of);
-                let direction = fill_direction(place, quarter);
-                rays.gather(points, &group, |_| direction, lights.occlusion_radius);
-                trace(simd, &mut rays.packet, view.systems, counts);
-                rays.scatter(sums);
-            }
-            for (i, sum) in group.iter().zip(&*sums) {
-                // No direction above the surface says nothing: open.
-                all[*i as usize].fill = if sum.1 > 0.0 { sum.0 / sum.1 } else { 1.0 };
-            }
+        for ray in 0..fill_rays {
+            let direction = fill_direction((ray * of + sample, fill_rays * of), quarter);
+            rays.gather(points, &group, |_| direction, lights.occlusion_radius);
+            trace(simd, &mut rays.packet, view.systems, counts);
+            rays.scatter(&group, &mut fills);
+        }
+    }
+    let together = together(points);
+    if key_rays > 0 {
+        for (i, visible) in shared(&together, points, &keys).into_iter().enumerate() {
+            all[i].key = visible * keys[i].1 / key_rays as f32;
+        }
+    }
+    if fill_rays > 0 {
+        for (reaching, visible) in all.iter_mut().zip(shared(&together, points, &fills)) {
+            reaching.fill = visible;
         }
     }
     all
+}
+
+/// The points in an order that puts those together whose light is alike: one sample of a square of two
+/// by two pixels, on the same sphere. It depends on nothing but the points.
+fn together(points: &[Point]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    order.sort_unstable_by_key(|i| {
+        let p = &points[*i as usize];
+        (p.near(), p.quarter)
+    });
+    order
+}
+
+/// The visible part, from sums of all points together: neighbours look in directions between each
+/// other's, so that each point has those of four (interleaved sampling, Keller and Heidrich 2001).
+fn shared(together: &[u32], points: &[Point], sums: &[(f32, f32)]) -> Vec<f32> {
+    let mut visible = vec![1.0; points.len()];
+    for near in together.chunk_by(|a, b| points[*a as usize].near() == points[*b as usize].near()) {
+        let total = near.iter().map(|i| sums[*i as usize]);
+        let total = total.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        // No direction above the surface says nothing: open.
+        if total.1 > 0.0 {
+            near.iter().for_each(|i| visible[*i as usize] = total.0 / total.1);
+        }
+    }
+    visible
 }
 
 /// Points of a packet of secondary rays.
@@ -183,12 +216,13 @@ impl Rays {
         }
     }
 
-    /// Adds (visible · cosine, cosine) to the sums of the rays' owners.
-    fn scatter(&self, sums: &mut [(f32, f32)]) {
+    /// Adds (visible · cosine, cosine) to the sums of the rays' points.
+    fn scatter(&self, group: &[u32], sums: &mut [(f32, f32)]) {
         for ray in 0..self.packet.len() {
-            let (owner, cosine) = (self.owner[ray] as usize, self.cosine[ray]);
-            sums[owner].0 += if self.packet.is_blocked(ray) { 0.0 } else { cosine };
-            sums[owner].1 += cosine;
+            let cosine = self.cosine[ray];
+            let sum = &mut sums[group[self.owner[ray] as usize] as usize];
+            sum.0 += if self.packet.is_blocked(ray) { 0.0 } else { cosine };
+            sum.1 += cosine;
         }
     }
 }
@@ -292,6 +326,8 @@ mod tests {
             sample,
             of: 4,
             quarter: 0,
+            square: (0, 0),
+            sphere: (0, 0),
             seed,
         }
     }

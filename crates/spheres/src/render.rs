@@ -249,7 +249,8 @@ impl Surface {
         let seed = hash(x ^ hash(y));
         let (position, normal, depth) = (self.position, self.normal, self.distance);
         let quarter = x % 2 + y % 2 * 2;
-        Point { position, normal, depth, lift, sample, of, quarter, seed }
+        let (square, sphere) = ((x / 2, y / 2), (self.system, self.index));
+        Point { position, normal, depth, lift, sample, of, quarter, square, sphere, seed }
     }
 }
 
