@@ -125,7 +125,7 @@ impl Grid {
             // `first` holds the count until here.
             let count = std::mem::replace(&mut block.first, particles);
             block.first_cell = cells;
-            divide(block, count, params);
+            divide(block, count, params, f64::from(lattice.edge));
             particles += count;
             cells += block.cells.iter().product::<u32>();
         }
@@ -229,7 +229,8 @@ fn lattice_for(low: Vec3, high: Vec3, count: usize, params: Params) -> Lattice {
     let m = f64::from(params.block_cells.max(1));
     match params.resolution {
         Resolution::CellsPerParticle(lambda) => {
-            let most = u32::MAX as f64 / 4.0;
+            // A lattice may not be larger than a few times its particles.
+            let most = 4.0 * count as f64 + 64.0;
             let blocks = (f64::from(lambda) * count as f64 / (m * m * m)).clamp(1.0, most);
             Lattice::with_blocks(low, high, blocks)
         }
@@ -324,7 +325,7 @@ fn measure_blocks(
 }
 
 /// Chooses the cells of a block with `count` particles.
-fn divide(block: &mut Block, count: u32, params: Params) {
+fn divide(block: &mut Block, count: u32, params: Params, block_edge: f64) {
     block.cells = match params.resolution {
         _ if count == 0 => [0; 3],
         Resolution::CellEdge(_) => [params.block_cells.max(1); 3],
@@ -335,7 +336,9 @@ fn divide(block: &mut Block, count: u32, params: Params) {
             // Whole numbers of cells near the even edge, and an edge with which they cover the box.
             let dims = extent.map(|e| (e / even).round().max(1.0));
             let cover = (0..3).map(|i| extent[i] / dims[i]).fold(0.0, f64::max);
-            let mut edge = cover.max(f64::from(LEAST_CELL_EDGE_RADII * block.greatest_radius));
+            let least = f64::from(LEAST_CELL_EDGE_RADII * block.greatest_radius);
+            // Particles at one point need no cells finer than their block.
+            let mut edge = if cover > 0.0 { cover.max(least) } else { block_edge };
             let cells = |edge: f64| extent.map(|e| ((e / edge * (1.0 - 1e-6)).ceil()).max(1.0));
             while cells(edge).iter().product::<f64>() > 1.5 * wanted {
                 edge *= 1.1;

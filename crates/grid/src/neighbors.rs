@@ -74,6 +74,9 @@ impl Grid {
     /// The median distance of a particle to its nearest neighbour, over a few thousand particles
     /// spread through the grid; `None` if all lie at one point.
     pub fn median_spacing(&self) -> Option<f32> {
+        if self.low == self.high {
+            return None;
+        }
         let step = self.len().div_ceil(SPACING_SAMPLE).max(1);
         let mut distances: Vec<f32> = (0..self.len())
             .into_par_iter()

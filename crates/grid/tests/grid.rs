@@ -231,3 +231,11 @@ fn nearest_distances_are_those_of_brute_force() {
         (0..1000).map(|i| [(i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32]).collect();
     assert_eq!(build(&lattice).median_spacing(), Some(1.0));
 }
+
+#[test]
+fn spacing_at_one_point_or_two_is_found_quickly() {
+    assert_eq!(build(&vec![[0.3; 3]; 200_000]).median_spacing(), None);
+    let mut two = vec![[0.3; 3]; 20_000];
+    two.extend(vec![[0.3, 0.3, 0.8]; 20_000]);
+    assert_eq!(build(&two).median_spacing(), Some(0.5));
+}

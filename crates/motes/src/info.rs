@@ -107,6 +107,11 @@ pub fn info(series: &mut Series, frame: usize, progress: Progress<'_>) -> Result
     let frames = series.frames(progress)?;
     let particles = series.frame(frame, &Wanted::All, progress)?;
     let bounds = particles.bounds();
+    let mut warnings = series.warnings();
+    let lost = particles.positions.iter().filter(|p| p.iter().any(|v| !v.is_finite())).count();
+    if lost > 0 {
+        warnings.push(format!("{lost} positions are not finite; bounds leave them out"));
+    }
     Ok(Info {
         format: series.format().into(),
         frames,
@@ -120,7 +125,7 @@ pub fn info(series: &mut Series, frame: usize, progress: Progress<'_>) -> Result
         time: particles.time,
         step: particles.step,
         properties: properties(&particles),
-        warnings: series.warnings(),
+        warnings,
     })
 }
 

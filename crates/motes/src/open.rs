@@ -67,6 +67,10 @@ pub fn read_scene(path: &Path) -> Result<Scene> {
 
 /// Whether `source` is a PNG picture, which is no source of particles but may hold a scene.
 pub fn is_picture(source: &str) -> bool {
+    // A pipe may never begin.
+    if !std::fs::metadata(source).is_ok_and(|m| m.is_file()) {
+        return false;
+    }
     let mut start = [0; PNG_SIGNATURE.len()];
     let read = File::open(source).and_then(|mut file| file.read_exact(&mut start));
     read.is_ok() && start == *PNG_SIGNATURE

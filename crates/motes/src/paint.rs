@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use motes_particles::expression::Property;
 use motes_particles::read::names;
-use motes_particles::{Column, Particles, Radius, Values};
+use motes_particles::{Column, Particles, Values};
 use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, nearest};
 
 use crate::{Error, Result};
@@ -60,94 +61,23 @@ pub(crate) enum Meaning {
     Categories { title: String, entries: Vec<(String, Vec3)> },
 }
 
-/// A number of each particle: a column's component or magnitude, a coordinate, the radius.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Property {
-    Column { index: usize, component: Option<usize> },
-    Position(Option<usize>),
-    Radius,
-}
-
-impl Property {
-    /// Finds the property called `name`; the component is the scene's, or the name's own suffix
-    /// (`Velocity.X`, `Velocity[0]`, `Velocity.Magnitude`).
-    ///
-    /// # Errors
-    /// There is no such property; the nearest name is given.
-    pub fn find(particles: &Particles, name: &str, component: Component) -> Result<Self> {
-        Self::find_or_word(particles, name, component, &[])
-    }
-
-    /// As [`Property::find`], where one of `words` may have been meant instead.
-    fn find_or_word(
-        particles: &Particles,
-        name: &str,
-        component: Component,
-        words: &[&str],
-    ) -> Result<Self> {
-        let suffixed = || {
-            let (stem, suffix) = split_component(name)?;
-            Self::exactly(particles, stem, suffix)
-        };
-        let found = Self::exactly(particles, name, component_number(component)).or_else(suffixed);
-        found.ok_or_else(|| {
-            let known = particles.columns.iter().map(|c| c.name.as_str());
-            let all = [names::POSITION, names::RADIUS].into_iter().chain(known);
-            let near = nearest(name, all.clone().chain(words.iter().copied()));
-            let hint = near.map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default();
-            let list = all.collect::<Vec<_>>().join(", ");
-            Error::Usage(format!("no property `{name}`{hint}; there are {list}"))
-        })
-    }
-
-    fn exactly(particles: &Particles, name: &str, component: Option<usize>) -> Option<Self> {
-        if name.eq_ignore_ascii_case(names::POSITION) {
-            return Some(Self::Position(component));
-        }
-        if name.eq_ignore_ascii_case(names::RADIUS) && particles.radius != Radius::Unknown {
-            return Some(Self::Radius);
-        }
-        let columns = particles.columns.iter();
-        let index = columns
-            .clone()
-            .position(|c| c.name == name)
-            .or_else(|| columns.clone().position(|c| c.name.eq_ignore_ascii_case(name)))?;
-        let fits = component.is_none_or(|c| c < particles.columns[index].components);
-        let component = if particles.columns[index].components == 1 { Some(0) } else { component };
-        fits.then_some(Self::Column { index, component })
-    }
-
-    /// The value of particle `row`.
-    pub fn value(&self, particles: &Particles, row: usize) -> f64 {
-        match *self {
-            Self::Column { index, component: Some(c) } => particles.columns[index].number(row, c),
-            Self::Column { index, component: None } => particles.columns[index].magnitude(row),
-            Self::Position(Some(axis)) => {
-                particles.origin[axis] + f64::from(particles.positions[row][axis])
-            }
-            Self::Position(None) => (0..3)
-                .map(|axis| {
-                    (particles.origin[axis] + f64::from(particles.positions[row][axis])).powi(2)
-                })
-                .sum::<f64>()
-                .sqrt(),
-            Self::Radius => match &particles.radius {
-                Radius::Each(radii) => f64::from(radii[row]),
-                Radius::Uniform(r) => f64::from(*r),
-                Radius::Unknown => f64::NAN,
-            },
-        }
-    }
-
-    /// Least and greatest finite value, positive ones only if `positive`.
-    pub fn range(&self, particles: &Particles, positive: bool) -> Option<[f64; 2]> {
-        (0..particles.len())
-            .map(|row| self.value(particles, row))
-            .filter(|v| v.is_finite() && (!positive || *v > 0.0))
-            .fold(None, |range, v| match range {
-                None => Some([v, v]),
-                Some([low, high]) => Some([v.min(low), v.max(high)]),
-            })
+/// Finds the property called `name`; where the name says no component, `component` does.
+///
+/// # Errors
+/// There is no such property; the nearest name is given.
+pub(crate) fn find_property(
+    particles: &Particles,
+    name: &str,
+    component: Component,
+) -> Result<Property> {
+    let found = Property::find(particles, name).map_err(Error::Usage)?;
+    let vector = match found {
+        Property::Column { component, .. } | Property::Position(component) => component.is_none(),
+        _ => false,
+    };
+    match component_number(component) {
+        Some(c) if vector => found.with_component(particles, Some(c)).map_err(Error::Usage),
+        _ => Ok(found),
     }
 }
 
@@ -158,23 +88,6 @@ fn component_number(component: Component) -> Option<usize> {
         Component::Z => Some(2),
         Component::Magnitude => None,
     }
-}
-
-/// `Velocity.X` → (`Velocity`, 0); `Stress[4]` → (`Stress`, 4); `Velocity.Magnitude` → no component.
-pub(crate) fn split_component(name: &str) -> Option<(&str, Option<usize>)> {
-    if let Some((stem, index)) = name.strip_suffix(']').and_then(|n| n.rsplit_once('[')) {
-        return index.parse().ok().map(|i| (stem, Some(i)));
-    }
-    let (stem, suffix) = name.rsplit_once('.')?;
-    let component = match suffix.to_ascii_lowercase().as_str() {
-        "x" | "r" | "1" => Some(0),
-        "y" | "g" | "2" => Some(1),
-        "z" | "b" | "3" => Some(2),
-        "w" | "4" => Some(3),
-        "magnitude" => None,
-        _ => return None,
-    };
-    Some((stem, component))
 }
 
 impl Paint {
@@ -315,7 +228,13 @@ fn by_property(
     name: &str,
     range: Option<[f64; 2]>,
 ) -> Result<(How, Meaning)> {
-    let property = Property::find_or_word(particles, name, coloring.component, WORDS)?;
+    let property =
+        find_property(particles, name, coloring.component).map_err(|error| {
+            match nearest(name, WORDS.iter().copied()) {
+                Some(word) => Error::Usage(format!("{error}; or did you mean `{word}`?")),
+                None => error,
+            }
+        })?;
     if let Property::Column { index, .. } = property
         && let column = &particles.columns[index]
         && let Values::Names { .. } = column.values
@@ -348,6 +267,7 @@ fn title_of(particles: &Particles, property: Property, name: &str) -> String {
         Property::Column { index, .. } => particles.columns[index].name.clone(),
         Property::Position(_) => names::POSITION.into(),
         Property::Radius => return names::RADIUS.into(),
+        Property::Index => return name.into(),
     };
     let components = match property {
         Property::Column { index, .. } => particles.columns[index].components,

@@ -19,6 +19,8 @@ pub(crate) enum Rule {
     Each(Vec<f32>),
     /// Half the median distance to the nearest neighbour: known once there is a grid.
     HalfSpacing,
+    /// A radius for some; for the others as above.
+    SomeElseHalfSpacing(Vec<Option<f32>>),
 }
 
 /// The rule for `particles`: `radius` of the scene; else, per type, `radii` of the scene; else the
@@ -37,17 +39,17 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
         Radius::Each(radii) => Rule::Each(radii.clone()),
         Radius::Unknown => types.and_then(of_elements).map_or(Rule::HalfSpacing, Rule::Each),
     };
-    match (given, rest) {
-        (None, rest) => rest,
-        (Some(given), rest) => {
-            let other = |i: usize| match &rest {
-                Rule::Uniform(r) => *r,
-                Rule::Each(radii) => radii[i],
-                Rule::HalfSpacing => LONE_RADIUS,
-            };
-            let radii = given.iter().enumerate();
-            Rule::Each(radii.map(|(i, r)| r.unwrap_or_else(|| other(i))).collect())
-        }
+    let Some(given) = given else { return rest };
+    let other = |i: usize| match &rest {
+        Rule::Uniform(r) => Some(*r),
+        Rule::Each(radii) => Some(radii[i]),
+        _ => None,
+    };
+    let radii: Vec<Option<f32>> =
+        given.iter().enumerate().map(|(i, r)| r.or_else(|| other(i))).collect();
+    match radii.iter().copied().collect() {
+        Some(all) => Rule::Each(all),
+        None => Rule::SomeElseHalfSpacing(radii),
     }
 }
 
@@ -108,13 +110,24 @@ pub(crate) fn classes(
             RadiusClasses::build(positions, Radii::Each(&radii), params)
         }
         Rule::HalfSpacing => {
-            // The least radius there is lets the grid be as fine as λ says.
-            let mut grid = Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
-            let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
+            let (mut grid, radius) = half_spacing(positions, params);
             grid.set_radius(radius * scale);
             let left_out = positions.len() - grid.len();
             let grids = if grid.is_empty() { vec![] } else { vec![grid] };
             RadiusClasses { grids, left_out }
         }
+        Rule::SomeElseHalfSpacing(radii) => {
+            let (_, other) = half_spacing(positions, params);
+            let radii = radii.into_iter().map(|r| r.unwrap_or(other)).collect();
+            classes(positions, Rule::Each(radii), scale, params)
+        }
     }
+}
+
+/// A grid over the positions, and half the median distance between neighbours in it.
+fn half_spacing(positions: &[[f32; 3]], params: motes_grid::Params) -> (Grid, f32) {
+    // The least radius there is lets the grid be as fine as λ says.
+    let grid = Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
+    let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
+    (grid, radius)
 }

@@ -12,7 +12,7 @@ use motes_scene::{Bounds, ColorBy, Framing, RangeOver, Resolved, Scene, Show};
 use motes_spheres::{Center, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations, frames_box};
-use crate::paint::{Meaning, Property, split_component};
+use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
 use crate::system::Loaded;
@@ -54,6 +54,8 @@ pub struct Session {
     pool: Option<rayon::ThreadPool>,
     /// Colour range per system over its whole series, once it was asked for.
     ranges: Vec<Option<[f64; 2]>>,
+    /// What could not be drawn.
+    notes: Vec<String>,
 }
 
 impl Session {
@@ -71,7 +73,7 @@ impl Session {
         };
         let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let ranges = vec![None; series.len()];
-        Ok(Self { scene, series, pool, ranges })
+        Ok(Self { scene, series, pool, ranges, notes: Vec::new() })
     }
 
     /// The scene.
@@ -89,9 +91,10 @@ impl Session {
         Ok(counts.collect::<motes_particles::Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
     }
 
-    /// What was odd in the sources but could be read.
+    /// What was odd in the sources but could be read, and what could not be drawn.
     pub fn warnings(&self) -> Vec<String> {
-        self.series.iter().flat_map(Series::warnings).collect()
+        let of_series = self.series.iter().flat_map(Series::warnings);
+        of_series.chain(self.notes.iter().cloned()).collect()
     }
 
     /// Renders frame `frame`.
@@ -119,6 +122,15 @@ impl Session {
         let start = Instant::now();
         let (loaded, origin) = self.load(particles)?;
         stats.ms.insert("build", milliseconds(start));
+        for l in loaded.iter().filter(|l| l.classes.left_out > 0) {
+            self.notes.push(format!(
+                "{}: frame {frame}: {} of {} particles are not drawn: their position is not finite, \
+                 or their radius not above zero",
+                self.scene.system[l.number as usize].source,
+                l.classes.left_out,
+                l.particles.len()
+            ));
+        }
 
         let boxes = framed(&loaded, origin, self.scene.overlay.r#box);
         let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
@@ -137,6 +149,7 @@ impl Session {
         stats.hash = format!("{:016x}", raw.hash());
         stats.peak_memory = peak_memory_bytes();
         let mut scene = self.scene.clone();
+        scene.system.iter_mut().for_each(|system| make_absolute(&mut system.source));
         scene.image.frame = u32::try_from(frame).unwrap_or(u32::MAX);
         Ok(Picture {
             raw,
@@ -211,6 +224,9 @@ impl Session {
             let own = usize::try_from(own).map_err(|_| {
                 Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
             })?;
+            // Beside a series, what has one frame stands still.
+            let still = own > 0 && self.series.len() > 1 && self.series[i].frames(&report)? == 1;
+            let own = if still { 0 } else { own };
             let wanted = wanted(system);
             if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
                 self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
@@ -286,32 +302,30 @@ impl motes_spheres::Paint for Paints<'_> {
     }
 }
 
+/// Makes a path absolute, so that a picture can be drawn again from any directory.
+fn make_absolute(source: &mut String) {
+    let is_path = !source.starts_with("demo:") && !source.starts_with("sim:");
+    if is_path && let Ok(path) = std::path::absolute(&*source) {
+        *source = path.to_string_lossy().into_owned();
+    }
+}
+
 fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// The columns that colours, radii and filters need.
+/// The columns that colours and radii need; all, where a property's name or an expression may mean any.
 fn wanted(system: &motes_scene::System) -> Wanted {
-    let mut wanted: Vec<String> = vec![names::PARTICLE_TYPE.into()];
-    let mut add = |name: &str| {
-        wanted.push(name.into());
-        wanted.extend(split_component(name).map(|(stem, _)| stem.to_owned()));
+    let by = match &system.color.by {
+        ColorBy::Auto => vec![names::COLOR],
+        ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
+        ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
+        ColorBy::Property(_) => return Wanted::All,
     };
-    match &system.color.by {
-        ColorBy::Auto => add(names::COLOR),
-        ColorBy::Chain => {
-            add(names::CHAIN);
-            add(names::MOLECULE_IDENTIFIER);
-        }
-        ColorBy::Property(name) => add(name),
-        ColorBy::Uniform | ColorBy::Element | ColorBy::Type => {}
+    if !system.r#where.trim().is_empty() || !system.filter.is_empty() {
+        return Wanted::All;
     }
-    system.filter.iter().for_each(|f| add(&f.property));
-    // A name that is spelled in another case, or an expression, may mean any column.
-    let exact = system.r#where.trim().is_empty()
-        && system.filter.is_empty()
-        && !matches!(system.color.by, ColorBy::Property(_));
-    if exact { Wanted::Only(wanted) } else { Wanted::All }
+    Wanted::Only(by.into_iter().chain([names::PARTICLE_TYPE]).map(str::to_owned).collect())
 }
 
 /// The range of the colouring property over all frames.
@@ -334,7 +348,7 @@ fn series_range(
         if particles.is_empty() {
             continue;
         }
-        let property = Property::find(&particles, name, system.color.component)?;
+        let property = find_property(&particles, name, system.color.component)?;
         if let Some([low, high]) = property.range(&particles, system.color.log) {
             let [a, b] = range.unwrap_or([low, high]);
             range = Some([a.min(low), b.max(high)]);

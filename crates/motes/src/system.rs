@@ -8,7 +8,7 @@ use motes_particles::Particles;
 use motes_particles::expression::{Selection, select};
 use motes_scene::{Bounds, Scene, System};
 
-use crate::paint::{Paint, Property};
+use crate::paint::{Paint, find_property};
 use crate::{Error, Result, radius};
 
 /// A system ready to be drawn.
@@ -85,7 +85,7 @@ fn visibility(
     let properties = system
         .filter
         .iter()
-        .map(|f| Property::find(particles, &f.property, f.component))
+        .map(|f| find_property(particles, &f.property, f.component))
         .collect::<Result<Vec<_>>>()?;
     let values: Vec<Box<dyn Fn(u32) -> f32 + Sync + '_>> = properties
         .iter()

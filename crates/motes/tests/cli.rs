@@ -413,3 +413,53 @@ fn a_closed_pipe_ends_it_quietly() {
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
+
+#[test]
+fn properties_go_by_the_files_own_names_and_components_are_checked() {
+    let folder = folder("properties");
+    let dump = data("dump_multiframe_5x8.dump");
+    let render = ["render", &dump, "-o", "x.png", "--size", "32x24", "--samples", "1", "-q"];
+    for good in ["Velocity", "vx", "VELOCITY.Y", "Position.Z", "position[0]", "Index"] {
+        succeeds(&folder, &[&render[..], &["--color-by", good]].concat());
+    }
+    for bad in ["Position[7]", "Position.w", "Velocity[3]", "Velocityy", "elemnt"] {
+        fails(&folder, &[&render[..], &["--color-by", bad]].concat(), 2);
+    }
+    let filter = "system.0.filter=[{property=\"Position[9]\",min=1}]";
+    fails(&folder, &[&render[..], &["--set", filter]].concat(), 2);
+}
+
+#[test]
+fn what_is_not_drawn_is_said_and_what_cannot_be_is_refused() {
+    let folder = folder("not-drawn");
+    fs::write(folder.join("nan.csv"), "x,y,z\n0,0,0\n1,0,0\nnan,0,0\n0,1,0\n").unwrap();
+    let render = ["render", "nan.csv", "-o", "x.png", "--size", "32x24", "--samples", "1"];
+    let said = text(&motes(&folder, &render).stderr);
+    assert!(said.contains("1 of 4 particles are not drawn"), "{said}");
+    for bad in [["--radius", "1e300"], ["--radius", "0"], ["--set", "spheres.lambda=1e9"]] {
+        let said = fails(&folder, &[&render[..], &bad].concat(), 2);
+        assert!(!said.contains("Some("), "{said}");
+    }
+    fails(&folder, &["render", "", "-o", "x.png"], 2);
+    fails(&folder, &["info", "."], 1);
+    assert!(fails(&folder, &["info", "/dev/null"], 1).contains("pipe or a device"));
+}
+
+#[test]
+fn a_picture_is_drawn_again_from_another_directory() {
+    let folder = folder("elsewhere");
+    fs::copy(data("trajectory.xyz"), folder.join("here.xyz")).unwrap();
+    let first = hash(&folder, &["here.xyz", "-o", "a.png"]);
+    let other = folder.join("other");
+    fs::create_dir(&other).unwrap();
+    assert_eq!(first, hash(&other, &["../a.png", "-o", "b.png"]));
+}
+
+#[test]
+fn a_single_frame_stands_still_beside_a_series() {
+    let folder = folder("still");
+    let (moving, still) = (data("trajectory.xyz"), data("mdapy_extended.xyz"));
+    let args = ["render", &moving, &still, "-o", "t_%d.png", "--frame", "all"];
+    succeeds(&folder, &[&args[..], &["--size", "32x24", "--samples", "1"]].concat());
+    assert!(folder.join("t_1.png").exists());
+}

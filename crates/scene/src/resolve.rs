@@ -148,7 +148,12 @@ impl Scene {
 
 /// `value` at `path` must be what `fits` says, in words `expected`.
 fn need<T: std::fmt::Debug>(path: &str, value: T, fits: bool, expected: &str) -> Result<()> {
-    if fits { Ok(()) } else { Err(SceneError::value(path, expected, format!("{value:?}"))) }
+    if fits {
+        return Ok(());
+    }
+    let found = format!("{value:?}");
+    let inner = found.strip_prefix("Some(").and_then(|found| found.strip_suffix(')'));
+    Err(SceneError::value(path, expected, inner.unwrap_or(&found).to_owned()))
 }
 
 fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
@@ -156,8 +161,9 @@ fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
     need(path, v.map(|v| v.to_array()), fits, "a finite vector with a length")
 }
 
+/// Above zero and finite, in single precision too.
 fn positive(v: f64) -> bool {
-    v > 0.0 && v.is_finite()
+    v as f32 > 0.0 && (v as f32).is_finite()
 }
 
 fn not_negative(v: f64) -> bool {
@@ -242,7 +248,7 @@ fn check_light(light: &Light) -> Result<()> {
 fn check_spheres(spheres: &Spheres) -> Result<()> {
     let (packet, lambda, block) = (spheres.packet, spheres.lambda, spheres.block);
     need("spheres.packet", packet, [2, 4, 8, 16].contains(&packet), "2, 4, 8 or 16")?;
-    need("spheres.lambda", lambda, positive(lambda), "a number above 0")?;
+    need("spheres.lambda", lambda, (0.001..=20.0).contains(&lambda), "a number in 0.001 to 20")?;
     need("spheres.block", block, (1..=64).contains(&block), "1 to 64 cells")
 }
 

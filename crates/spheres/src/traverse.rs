@@ -231,8 +231,9 @@ impl<S: Simd> Walk<'_, S> {
             * cells(k, ks);
         // A row is a run of several cells along x.
         let rows = across / if k == 0 { X_STEP as f32 } else { 2.0 };
-        let particles: u32 = block.cells.iter().product();
-        rows * LANES as f32 >= particles as f32
+        // By λ, a block has about as many cells as particles.
+        let cells: u32 = block.cells.iter().product();
+        rows * LANES as f32 >= cells as f32
     }
 
     /// Culls and tests the particles of a run of cells.

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 
 use motes::{Info, PropertyInfo, Range, Watch, info, open};
 
+use super::frames::Frames;
 use super::meter::Meter;
 use super::talk::{Failure, Talk, print};
-use super::values::{count, short, whole};
+use super::values::{count, short};
 
 /// Names shown of a property whose values are names.
 const NAMES: usize = 12;
@@ -25,29 +26,33 @@ pub(crate) struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// The frame to look at, counted from 0
-    #[arg(long, value_name = "N", default_value = "0", value_parser = whole)]
-    frame: u32,
+    /// The frame to look at, counted from 0, or last
+    #[arg(long, value_name = "N", default_value = "0")]
+    frame: Frames,
 }
 
 pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
     let mut series = open(&args.source)?;
     let meter = Meter::new(talk);
-    let found = info(&mut series, args.frame as usize, &|done, total| {
-        meter.progress("read", done, total);
-    })?;
+    let tell = |done, total| _ = meter.progress("read", done, total);
+    let frame = match args.frame {
+        Frames::One(frame) => frame,
+        Frames::Last => series.frames(&tell).map_err(motes::Error::from)?.saturating_sub(1),
+        Frames::Range(..) => return Err(Failure::usage("--frame: expected one frame, or last")),
+    };
+    let found = info(&mut series, frame, &tell)?;
     drop(meter);
     talk.warn(&found.warnings);
     let text = if args.json {
         let json = serde_json::to_string_pretty(&found);
         json.map_err(|e| Failure::data(format!("{}: {e}", args.source)))? + "\n"
     } else {
-        summary(&found, &args.source, args.frame)
+        summary(&found, &args.source, frame)
     };
     print(text.as_bytes())
 }
 
-fn summary(info: &Info, source: &str, frame: u32) -> String {
+fn summary(info: &Info, source: &str, frame: usize) -> String {
     let mut out = format!("{source}\n");
     let mut line = |name: &str, value: &str| _ = writeln!(out, "  {name:<10} {value}");
     line("format", &info.format);

@@ -41,7 +41,7 @@ pub(crate) struct Args {
     )]
     renderer: Renderer,
     /// Frame from 0, frames A..B, all or last
-    #[arg(long, value_name = "N|A..B")]
+    #[arg(long, value_name = "N|A..B", allow_hyphen_values = true)]
     frame: Option<Frames>,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = threads)]
@@ -110,7 +110,7 @@ struct Look {
     #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
     range: Option<String>,
     /// Show only particles such as 'Mass > 2'
-    #[arg(long, value_name = "EXPR")]
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     r#where: Option<String>,
 }
 
@@ -221,6 +221,9 @@ impl Args {
 
     /// The scene before flags: a file's, a picture's, or the default with the sources in it.
     fn base(&self) -> Result<Scene, Failure> {
+        if self.sources.iter().any(|source| source.trim().is_empty()) {
+            return Err(Failure::usage("SOURCE is empty: expected a file, a pattern or demo:…"));
+        }
         if let Some(picture) = self.sources.iter().find(|source| is_picture(source)) {
             if self.scene.is_some() || self.sources.len() > 1 {
                 let message = format!("{picture}: a picture brings its own scene and sources");

@@ -46,6 +46,7 @@ mod tests;
 mod token;
 
 pub use error::ExpressionError;
+pub use resolve::Source as Property;
 
 use crate::Particles;
 

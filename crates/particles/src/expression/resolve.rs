@@ -3,17 +3,21 @@
 use crate::read::names;
 use crate::{Particles, Radius, Values};
 
-/// Where the values of a property are.
+/// Where the values of a property are: one number of each particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Source {
+pub enum Source {
     /// A column's component, or its magnitude.
     Column {
+        /// The column's place among the columns.
         index: usize,
+        /// The component; none: the magnitude.
         component: Option<usize>,
     },
     /// A coordinate, or the distance from the file's own origin.
     Position(Option<usize>),
+    /// The file's radius.
     Radius,
+    /// The particle's number in the file's order.
     Index,
 }
 
@@ -23,7 +27,11 @@ const INDEX: &str = "Index";
 const LIKE: f64 = 0.7;
 
 impl Source {
-    /// Finds the property that `name`, with or without a component, means.
+    /// Finds the property that `name`, with or without a component, means: the field's name, the file's
+    /// own spelling, in any case.
+    ///
+    /// # Errors
+    /// There is no such property or component; the nearest name is given.
     pub fn find(particles: &Particles, name: &str) -> Result<Self, String> {
         let known = known(particles);
         if let Some(source) = find_name(&known, name) {
@@ -42,7 +50,15 @@ impl Source {
         Err(unknown(particles, &known, name))
     }
 
-    fn with_component(self, particles: &Particles, wanted: Option<usize>) -> Result<Self, String> {
+    /// The same property's component `wanted`, or its magnitude.
+    ///
+    /// # Errors
+    /// It has no such component.
+    pub fn with_component(
+        self,
+        particles: &Particles,
+        wanted: Option<usize>,
+    ) -> Result<Self, String> {
         let (name, components) = match self {
             Self::Column { index, .. } => {
                 let column = &particles.columns[index];
@@ -68,8 +84,37 @@ impl Source {
         }
     }
 
+    /// The value of particle `row`.
+    pub fn value(self, particles: &Particles, row: usize) -> f64 {
+        let coordinate =
+            |axis: usize| particles.origin[axis] + f64::from(particles.positions[row][axis]);
+        match self {
+            Self::Column { index, component: Some(c) } => particles.columns[index].number(row, c),
+            Self::Column { index, component: None } => particles.columns[index].magnitude(row),
+            Self::Position(Some(axis)) => coordinate(axis),
+            Self::Position(None) => (0..3).map(|a| coordinate(a).powi(2)).sum::<f64>().sqrt(),
+            Self::Radius => match &particles.radius {
+                Radius::Each(radii) => f64::from(radii[row]),
+                Radius::Uniform(r) => f64::from(*r),
+                Radius::Unknown => f64::NAN,
+            },
+            Self::Index => row as f64,
+        }
+    }
+
+    /// Least and greatest finite value, of positive ones only if `positive`.
+    pub fn range(self, particles: &Particles, positive: bool) -> Option<[f64; 2]> {
+        (0..particles.len())
+            .map(|row| self.value(particles, row))
+            .filter(|v| v.is_finite() && (!positive || *v > 0.0))
+            .fold(None, |range, v| match range {
+                None => Some([v, v]),
+                Some([low, high]) => Some([v.min(low), v.max(high)]),
+            })
+    }
+
     /// The names, if the property holds names and one of them is meant for each particle.
-    pub fn names(self, particles: &Particles) -> Option<Names<'_>> {
+    pub(super) fn names(self, particles: &Particles) -> Option<Names<'_>> {
         let Self::Column { index, component: Some(component) } = self else { return None };
         let column = &particles.columns[index];
         match &column.values {
@@ -81,7 +126,7 @@ impl Source {
     }
 
     /// `number` rounded as the values of the property were; as it is where that leaves nothing of it.
-    pub fn round(self, particles: &Particles, number: f64) -> f64 {
+    pub(super) fn round(self, particles: &Particles, number: f64) -> f64 {
         let single = |v: f64| {
             let rounded = v as f32;
             if rounded.is_normal() { f64::from(rounded) } else { v }

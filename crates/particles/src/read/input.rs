@@ -5,7 +5,7 @@ use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::inflate;
-use crate::{ReadError, Result};
+use crate::{Place, ReadError, Result};
 
 /// How many decompressed bytes a format sees to recognise a file.
 const HEAD_BYTES: u64 = 64 * 1024;
@@ -84,6 +84,21 @@ impl Input {
 
     fn new(path: &Path, built_in: Option<&'static [u8]>) -> Result<Self> {
         let io = |e: std::io::Error| ReadError::io(path, &e);
+        if built_in.is_none() {
+            let kind = std::fs::metadata(path).map_err(io)?;
+            if kind.is_dir() {
+                return Err(ReadError::new(
+                    path,
+                    Place::Whole,
+                    "expected a file, found a directory",
+                ));
+            }
+            if !kind.is_file() {
+                // A pipe cannot be read twice, and may never begin.
+                let message = "expected a file, found a pipe or a device";
+                return Err(ReadError::new(path, Place::Whole, message));
+            }
+        }
         let mut stored = stored(path, built_in).map_err(io)?;
         let stored_bytes = match built_in {
             Some(bytes) => bytes.len() as u64,
