@@ -25,6 +25,9 @@ const SCENE_BYTES: u64 = 32 << 20;
 /// # Errors
 /// As [`Series::open`].
 pub fn open(source: &str) -> Result<Series> {
+    if source.starts_with("sim:") {
+        return Err(Error::Usage(format!("{source}: simulations are not in this version")));
+    }
     if source != BUILT_IN {
         return Ok(Series::open(source)?);
     }

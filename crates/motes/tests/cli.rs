@@ -442,6 +442,7 @@ fn what_is_not_drawn_is_said_and_what_cannot_be_is_refused() {
     }
     fails(&folder, &["render", "", "-o", "x.png"], 2);
     fails(&folder, &["info", "."], 1);
+    assert!(fails(&folder, &["info", "sim:dam-break"], 2).contains("not in this version"));
     assert!(fails(&folder, &["info", "/dev/null"], 1).contains("pipe or a device"));
 }
 
