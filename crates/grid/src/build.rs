@@ -109,8 +109,8 @@ impl Grid {
     ) -> Self {
         let buckets = bucket_starts.len() - 1;
         let block_starts: Vec<usize> =
-            (0..=buckets).map(|b| first_block(b, buckets, lattice.len())).collect();
-        let mut blocks = vec![Block::default(); lattice.len() + 1];
+            (0..=buckets).map(|b| first_block(b, buckets, lattice.count())).collect();
+        let mut blocks = vec![Block::default(); lattice.count() + 1];
 
         // Count, then choose each block's cells, then know where everything goes.
         split(&mut blocks, &block_starts).into_par_iter().enumerate().for_each(|(b, blocks)| {
@@ -253,7 +253,7 @@ fn sort_into_buckets(
     lattice: &Lattice,
     count: usize,
 ) -> (Vec<Item>, Vec<usize>) {
-    let blocks = lattice.len();
+    let blocks = lattice.count();
     let buckets = (count / BUCKET_PARTICLES).clamp(1, MOST_BUCKETS).min(blocks);
     let bucket_of = |p: [f32; 3]| {
         let block = lattice.index(lattice.block_of(Vec3::from_array(p)));

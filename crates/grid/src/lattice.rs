@@ -38,13 +38,8 @@ impl Lattice {
     }
 
     /// The number of blocks.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.dims.iter().map(|d| *d as usize).product()
-    }
-
-    /// Whether there is no block: never, but clippy wants to know.
-    pub fn is_empty(&self) -> bool {
-        false
     }
 
     /// The block along each axis that holds point `p`; points outside fall into the nearest block.
@@ -114,7 +109,7 @@ mod tests {
     #[test]
     fn index_and_block_are_inverse() {
         let lattice = Lattice { low: Vec3::ZERO, edge: 1.0, dims: [3, 4, 5] };
-        for i in 0..lattice.len() {
+        for i in 0..lattice.count() {
             assert_eq!(lattice.index(lattice.block_at(i)), i);
         }
     }

@@ -35,7 +35,7 @@ pub(crate) fn annotations(
     let on = |show: Show, auto: bool| show == Show::On || (show == Show::Auto && auto);
     Annotations {
         ink: Ink::default(),
-        lines: box_lines(annotated.systems, overlay.r#box, view),
+        lines: box_lines(annotated.systems, view),
         legend: (overlay.legend != Show::Off).then(|| legend(annotated.systems)).flatten(),
         scale_bar: on(overlay.scale_bar, view.projection == Projection::Orthographic)
             .then(|| scale_bar(view)),
@@ -45,14 +45,14 @@ pub(crate) fn annotations(
     }
 }
 
-/// Whether the box of `particles` is drawn, and so framed: where it is asked for, or where the
-/// particles fill it.
-pub(crate) fn frames_box(particles: &Particles, show: Show) -> bool {
-    match (show, particles.sim_box, particles.bounds()) {
-        (Show::Off, ..) | (_, None, _) | (Show::Auto, _, None) => false,
-        (Show::On, Some(_), _) => true,
-        (Show::Auto, Some(sim_box), Some((low, high))) => fills(&sim_box, low, high),
-    }
+/// The box of `particles` if it is drawn, and so framed: where it is asked for, or where the particles
+/// fill it.
+pub(crate) fn box_shown(particles: &Particles, show: Show) -> Option<SimulationBox> {
+    particles.sim_box.filter(|sim_box| match show {
+        Show::Off => false,
+        Show::On => true,
+        Show::Auto => particles.bounds().is_some_and(|(low, high)| fills(sim_box, low, high)),
+    })
 }
 
 fn fills(sim_box: &SimulationBox, low: [f64; 3], high: [f64; 3]) -> bool {
@@ -65,10 +65,10 @@ fn fills(sim_box: &SimulationBox, low: [f64; 3], high: [f64; 3]) -> bool {
     })
 }
 
-fn box_lines(systems: &[Loaded], show: Show, view: &CameraView) -> Option<Lines> {
-    let boxes = systems.iter().filter(|l| frames_box(&l.particles, show));
-    let lines: Vec<Line> = boxes
-        .filter_map(|l| l.particles.sim_box)
+fn box_lines(systems: &[Loaded], view: &CameraView) -> Option<Lines> {
+    let lines: Vec<Line> = systems
+        .iter()
+        .filter_map(|l| l.sim_box)
         .flat_map(|b| {
             let corners = b.corners().map(DVec3::from_array);
             // An edge joins two corners whose indices differ in one bit.

@@ -11,7 +11,7 @@ use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, RangeOver, Resolved, Scene, Show};
 use motes_spheres::{Center, Settings, Spheres, View};
 
-use crate::annotate::{Annotated, annotations, frames_box};
+use crate::annotate::{Annotated, annotations};
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
@@ -102,14 +102,19 @@ impl Session {
     /// # Errors
     /// The frame cannot be read, a property is not there, or the watch cancels.
     pub fn render(&mut self, frame: usize, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+        self.in_pool(|session| session.render_here(frame, layers, watch))
+    }
+
+    /// Works on the session's own threads, if it was given a number of them.
+    fn in_pool<T: Send>(&mut self, work: impl FnOnce(&mut Self) -> T + Send) -> T {
         // The pool is taken out for the call, as the work needs all of the session.
         match self.pool.take() {
             Some(pool) => {
-                let picture = pool.install(|| self.render_here(frame, layers, watch));
+                let done = pool.install(|| work(self));
                 self.pool = Some(pool);
-                picture
+                done
             }
-            None => self.render_here(frame, layers, watch),
+            None => work(self),
         }
     }
 
@@ -132,12 +137,10 @@ impl Session {
             ));
         }
 
-        let boxes = framed(&loaded, origin, self.scene.overlay.r#box);
+        let boxes = framed(&loaded, origin);
         let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth.
-        let show_box = self.scene.overlay.r#box;
-        let layers =
-            layers == Layers::Yes || loaded.iter().any(|l| frames_box(&l.particles, show_box));
+        let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
         let raw = self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?;
         stats.ms.insert("trace", milliseconds(start));
@@ -170,6 +173,14 @@ impl Session {
         frames: std::ops::RangeInclusive<usize>,
         watch: &dyn Watch,
     ) -> Result<()> {
+        self.in_pool(|session| session.hold_view_here(frames, watch))
+    }
+
+    fn hold_view_here(
+        &mut self,
+        frames: std::ops::RangeInclusive<usize>,
+        watch: &dyn Watch,
+    ) -> Result<()> {
         let (first, last) = (*frames.start(), *frames.end());
         let mut looks = vec![first, first + last.saturating_sub(first) / 2, last];
         looks.dedup();
@@ -177,7 +188,7 @@ impl Session {
         for frame in looks {
             let particles = self.read(frame, watch)?;
             let (loaded, origin) = self.load(particles)?;
-            boxes.extend(framed(&loaded, origin, self.scene.overlay.r#box));
+            boxes.extend(framed(&loaded, origin));
             last = loaded;
         }
         let view = self.scene.resolve_framing(self.framing(&last, &boxes))?.view;
@@ -358,9 +369,9 @@ fn series_range(
 }
 
 /// Boxes around all that is to be framed.
-fn framed(loaded: &[Loaded], origin: DVec3, show_box: Show) -> Vec<Bounds> {
+fn framed(loaded: &[Loaded], origin: DVec3) -> Vec<Bounds> {
     let of_box = |l: &Loaded| {
-        let corners = l.particles.sim_box.filter(|_| frames_box(&l.particles, show_box))?.corners();
+        let corners = l.sim_box?.corners();
         Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
     };
     loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l))).collect()

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
-use motes_particles::Particles;
 use motes_particles::expression::{Selection, select};
+use motes_particles::{Particles, SimulationBox};
 use motes_scene::{Bounds, Scene, System};
 
+use crate::annotate::box_shown;
 use crate::paint::{Paint, find_property};
 use crate::{Error, Result, radius};
 
@@ -16,6 +17,8 @@ pub(crate) struct Loaded {
     /// Its place in the scene.
     pub number: u16,
     pub particles: Arc<Particles>,
+    /// The simulation box, where it is shown.
+    pub sim_box: Option<SimulationBox>,
     pub classes: RadiusClasses,
     pub visible: Vec<Visibility>,
     pub paint: Paint,
@@ -49,7 +52,8 @@ impl Loaded {
         };
         let visible = visibility(&particles, &classes, system)?;
         let paint = Paint::new(&particles, &system.color, range)?;
-        Ok(Self { number, particles, classes, visible, paint })
+        let sim_box = box_shown(&particles, scene.overlay.r#box);
+        Ok(Self { number, particles, sim_box, classes, visible, paint })
     }
 
     /// How many particles pass the filters.

@@ -31,13 +31,6 @@ pub struct Background {
     pub bottom: Vec3,
 }
 
-impl Background {
-    /// The colour at `t` down the picture, 0 at the top, 1 at the bottom.
-    pub fn at(&self, t: f32) -> Vec3 {
-        self.top.lerp(self.bottom, t)
-    }
-}
-
 /// The lights in world coordinates and linear light: a surface of albedo ρ and normal n that sees them
 /// all has the light ρ·(key·max(0, n·d) + fill(n)).
 #[derive(Debug, Clone, Copy, PartialEq)]

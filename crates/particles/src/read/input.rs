@@ -84,26 +84,11 @@ impl Input {
 
     fn new(path: &Path, built_in: Option<&'static [u8]>) -> Result<Self> {
         let io = |e: std::io::Error| ReadError::io(path, &e);
-        if built_in.is_none() {
-            let kind = std::fs::metadata(path).map_err(io)?;
-            if kind.is_dir() {
-                return Err(ReadError::new(
-                    path,
-                    Place::Whole,
-                    "expected a file, found a directory",
-                ));
-            }
-            if !kind.is_file() {
-                // A pipe cannot be read twice, and may never begin.
-                let message = "expected a file, found a pipe or a device";
-                return Err(ReadError::new(path, Place::Whole, message));
-            }
-        }
-        let mut stored = stored(path, built_in).map_err(io)?;
         let stored_bytes = match built_in {
             Some(bytes) => bytes.len() as u64,
-            None => std::fs::metadata(path).map_err(io)?.len(),
+            None => file_bytes(path)?,
         };
+        let mut stored = stored(path, built_in).map_err(io)?;
         let mut magic = [0; 4];
         let mut seen = 0;
         while seen < 4 {
@@ -206,6 +191,17 @@ impl Input {
             .map_err(|e| ReadError::io(&self.path, &e))?;
         Ok(out)
     }
+}
+
+/// The size of the file at `path`. A pipe is refused: it cannot be read twice, and may never begin.
+fn file_bytes(path: &Path) -> Result<u64> {
+    let kind = std::fs::metadata(path).map_err(|e| ReadError::io(path, &e))?;
+    let found = match (kind.is_file(), kind.is_dir()) {
+        (true, _) => return Ok(kind.len()),
+        (false, true) => "a directory",
+        (false, false) => "a pipe or a device",
+    };
+    Err(ReadError::new(path, Place::Whole, format!("expected a file, found {found}")))
 }
 
 fn stored(path: &Path, built_in: Option<&'static [u8]>) -> std::io::Result<Box<dyn Stored>> {

@@ -29,6 +29,7 @@ mod rows;
 mod table;
 mod text;
 mod trajectory;
+mod whole;
 mod xyz;
 
 pub use input::{Head, Input};

@@ -10,10 +10,11 @@
 mod ascii;
 mod binary;
 
+use std::path::Path;
+
 use super::dictionary::Dictionary;
-use super::{
-    Confidence, Format, Head, Input, MOST_COMPONENTS, Progress, Reader, Wanted, names, only_frame,
-};
+use super::whole::WholeFile;
+use super::{Confidence, Format, Head, Input, MOST_COMPONENTS, Reader, Wanted, names};
 use crate::{Column, Particles, Place, PositionBuilder, Radius, ReadError, Result, Values};
 
 /// The first bytes of classic binary geometry.
@@ -57,7 +58,7 @@ impl Format for Houdini {
                            only the classic one, version 5, is read";
             return Err(ReadError::new(input.path(), Place::Whole, message));
         }
-        Ok(Box::new(Geometry { input, warnings: vec![] }))
+        Ok(Box::new(WholeFile::new(input, parse)))
     }
 }
 
@@ -68,36 +69,12 @@ fn is_json(head: &Head<'_>) -> bool {
     trimmed.starts_with(b"[") && memchr::memmem::find(trimmed, b"\"fileversion\"").is_some()
 }
 
-/// A file is one frame.
-struct Geometry {
-    input: Input,
-    warnings: Vec<String>,
-}
-
-impl Reader for Geometry {
-    fn count(&mut self, _: Progress<'_>) -> Result<usize> {
-        Ok(1)
-    }
-
-    fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
-        let path = self.input.path();
-        only_frame(path, frame)?;
-        let all = self.input.stored_bytes();
-        progress(0, all);
-        let bytes = self.input.read(0, u64::MAX)?;
-        let points = match bytes.starts_with(BINARY) {
-            true => binary::points(path, &bytes, wanted)?,
-            false => ascii::points(path, &bytes, wanted)?,
-        };
-        let (particles, warnings) = points.into_particles();
-        self.warnings = warnings;
-        progress(all, all);
-        Ok(particles)
-    }
-
-    fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
-    }
+fn parse(path: &Path, bytes: &[u8], wanted: &Wanted) -> Result<(Particles, Vec<String>)> {
+    let points = match bytes.starts_with(BINARY) {
+        true => binary::points(path, bytes, wanted)?,
+        false => ascii::points(path, bytes, wanted)?,
+    };
+    Ok(points.into_particles())
 }
 
 /// The types of attributes.

@@ -9,10 +9,13 @@
 mod columns;
 mod cursor;
 
+use std::path::Path;
+
 use columns::Columns;
 use cursor::{Cursor, Type};
 
-use super::{Confidence, Format, Head, Input, Progress, Reader, Wanted, only_frame};
+use super::whole::WholeFile;
+use super::{Confidence, Format, Head, Input, Reader, Wanted};
 use crate::{Particles, PositionBuilder, Result, Values};
 
 /// A lattice of points may have this many, however small the file: it has to be stored in no array.
@@ -34,38 +37,14 @@ impl Format for LegacyVtk {
     }
 
     fn open(&self, input: Input) -> Result<Box<dyn Reader>> {
-        Ok(Box::new(VtkFile { input, warnings: vec![] }))
+        Ok(Box::new(WholeFile::new(input, parse)))
     }
 }
 
-/// A file is one frame.
-struct VtkFile {
-    input: Input,
-    warnings: Vec<String>,
-}
-
-impl Reader for VtkFile {
-    fn count(&mut self, _: Progress<'_>) -> Result<usize> {
-        Ok(1)
-    }
-
-    fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
-        let path = self.input.path();
-        only_frame(path, frame)?;
-        let all = self.input.stored_bytes();
-        progress(0, all);
-        let bytes = self.input.read(0, u64::MAX)?;
-        let mut data_set = DataSet::new(Cursor::open(path, &bytes)?, wanted);
-        data_set.read()?;
-        let (particles, warnings) = data_set.finish()?;
-        self.warnings = warnings;
-        progress(all, all);
-        Ok(particles)
-    }
-
-    fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
-    }
+fn parse(path: &Path, bytes: &[u8], wanted: &Wanted) -> Result<(Particles, Vec<String>)> {
+    let mut data_set = DataSet::new(Cursor::open(path, bytes)?, wanted);
+    data_set.read()?;
+    data_set.finish()
 }
 
 /// What the arrays that are being read belong to.
