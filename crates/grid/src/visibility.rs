@@ -119,6 +119,32 @@ impl Visibility {
         }
     }
 
+    /// The same, but with a bit per particle in every block that has any: culling particle by particle
+    /// without macrocells, which Gribble et al. 2007 compare with in Table 7.
+    pub fn without_blocks(&self, grid: &Grid) -> Self {
+        let mut all = Self { states: Vec::new(), words: Vec::new(), visible: self.visible };
+        for block in 0..self.states.len() {
+            let particles = grid.particles_of(block).len();
+            if particles == 0 {
+                all.states.push(HIDDEN);
+                continue;
+            }
+            all.states.push(all.words.len() as u32);
+            match self.block(grid, block) {
+                Seen::Mixed(words) => all.words.extend(words),
+                Seen::Hidden => all.words.resize(all.words.len() + particles.div_ceil(64), 0),
+                Seen::Shown => {
+                    let whole = std::iter::repeat_n(u64::MAX, particles / 64);
+                    all.words.extend(whole);
+                    if !particles.is_multiple_of(64) {
+                        all.words.push((1 << (particles % 64)) - 1);
+                    }
+                }
+            }
+        }
+        all
+    }
+
     /// How many particles pass the filters, coinciding ones included.
     pub fn visible(&self) -> usize {
         self.visible

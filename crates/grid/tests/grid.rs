@@ -195,8 +195,14 @@ fn filters_show_what_brute_force_shows() {
             .collect();
         assert_eq!(seen(&grid, &visibility), expected);
         assert_eq!(visibility.visible(), expected.len());
+        let bits = visibility.without_blocks(&grid);
+        assert_eq!((seen(&grid, &bits), bits.visible()), (expected, visibility.visible()));
+        let mut blocks = (0..grid.blocks.len() - 1).filter(|b| !grid.is_empty_block(*b));
+        assert!(blocks.all(|b| matches!(bits.block(&grid, b), Seen::Mixed(_))));
     }
-    assert_eq!(seen(&grid, &Visibility::all(&grid)).len(), 30_000);
+    let all = Visibility::all(&grid);
+    assert_eq!(seen(&grid, &all).len(), 30_000);
+    assert_eq!(seen(&grid, &all.without_blocks(&grid)), seen(&grid, &all));
 }
 
 #[test]

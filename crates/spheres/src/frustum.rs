@@ -16,13 +16,14 @@ use crate::packet::Packet;
 
 /// The four bounding planes of a packet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frustum {
+pub struct Frustum {
     /// The axes K, U, V.
     pub axes: [usize; 3],
     /// +1 where the rays run towards greater k, else −1.
     pub sign: f32,
-    /// Where along K the planes start and end, in the order of travel.
+    /// Where along K the planes start.
     pub k_start: f32,
+    /// Where along K they end, in the order of travel.
     pub k_end: f32,
     /// Least u, greatest u, least v, greatest v at `k_start`.
     pub at_start: [f32; 4],
@@ -38,7 +39,8 @@ pub(crate) struct Frustum {
 const LEAST_K: f32 = 1e-2;
 
 /// What a packet's rays may meet.
-pub(crate) enum Bounds {
+#[derive(Debug)]
+pub enum Bounds {
     /// No sphere with its centre in the box.
     Nothing,
     /// Rays too different to share a major axis.

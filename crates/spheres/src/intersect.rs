@@ -15,18 +15,20 @@ use crate::frustum::Frustum;
 use crate::packet::{BLOCKED, LANES, NO_SLOT, Packet};
 
 /// A sphere, and where it lies.
-#[derive(Clone, Copy)]
-pub(crate) struct Sphere {
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    /// Centre.
     pub center: Vec3,
+    /// Radius.
     pub radius: f32,
-    /// Slot in the system's grids.
+    /// Slot in the system's grids, or whatever else tells it from the others.
     pub slot: u32,
 }
 
 /// Tests all rays of the packet against one sphere and keeps nearer hits. Gives whether there were
 /// any. At equal distance the lower index in the file wins, and an earlier system before a later.
 #[simd]
-pub(crate) fn intersect<S: Simd>(
+pub fn intersect<S: Simd>(
     simd: S,
     packet: &mut Packet,
     sphere: Sphere,
@@ -105,7 +107,7 @@ fn break_ties(
 
 /// How far along K the packet's rays still look: the greatest k·sign of any ray's nearest hit.
 #[simd]
-pub(crate) fn farthest<S: Simd>(simd: S, packet: &Packet, frustum: &Frustum) -> f32 {
+pub fn farthest<S: Simd>(simd: S, packet: &Packet, frustum: &Frustum) -> f32 {
     let k = frustum.axes[0];
     let sign = f32x16::splat(simd, frustum.sign);
     let mut farthest = f32x16::splat(simd, f32::NEG_INFINITY);

@@ -5,6 +5,7 @@
 //!
 //! - [`Packet`]: rays and their nearest hits
 //! - [`trace`]: a packet through the grids of the systems
+//! - [`Frustum`], [`intersect`]: its parts, for walks through other structures (the benches compare some)
 //! - [`render`]: a whole picture, tile by tile, on all cores
 //! - [`mod@reference`]: brute force in f64, the definition; for tests
 //!
@@ -20,6 +21,8 @@ mod render;
 mod shade;
 mod traverse;
 
+pub use frustum::{Bounds, Frustum};
+pub use intersect::{Sphere, farthest, intersect};
 pub use packet::{LANES, MOST_RAYS, Packet};
 pub use render::{Center, Picture, Settings, View, render};
 pub use shade::Paint;

@@ -22,6 +22,8 @@ pub struct Packet {
     pub(crate) rays: usize,
     /// Whether any hit ends a ray, not only the nearest.
     pub(crate) any_hit: bool,
+    /// Whether spheres outside the frustum are left out.
+    pub(crate) culls: bool,
     pub(crate) origin: [[f32; MOST_RAYS]; 3],
     pub(crate) direction: [[f32; MOST_RAYS]; 3],
     /// Distance of the nearest hit; +∞ for none.
@@ -40,6 +42,7 @@ impl Packet {
         Self {
             rays: 0,
             any_hit: false,
+            culls: true,
             origin: [[0.0; MOST_RAYS]; 3],
             direction: [[0.0; MOST_RAYS]; 3],
             distance: [f32::INFINITY; MOST_RAYS],
@@ -59,6 +62,12 @@ impl Packet {
     pub fn clear_for_any_hit(&mut self) {
         self.rays = 0;
         self.any_hit = true;
+    }
+
+    /// From now on tests every sphere of the cells its frustum overlaps, culling none: what Gribble et
+    /// al. 2007 compare with in Table 6. The hits are the same.
+    pub fn test_all(&mut self) {
+        self.culls = false;
     }
 
     /// Adds a ray; `direction` has unit length.
@@ -122,14 +131,14 @@ impl Packet {
     }
 
     /// Begins a system: no ray has hit it yet.
-    pub(crate) fn begin_system(&mut self) {
+    pub fn begin_system(&mut self) {
         let lanes = self.lanes();
         self.slot[..lanes].fill(NO_SLOT);
         self.pad();
     }
 
     /// Ends a system: where its spheres are nearest, they are the hits.
-    pub(crate) fn end_system(&mut self, system: u16) {
+    pub fn end_system(&mut self, system: u16) {
         for i in (0..self.rays).filter(|i| self.slot[*i] != NO_SLOT) {
             self.hit_slot[i] = self.slot[i];
             self.hit_system[i] = system;
@@ -150,7 +159,7 @@ impl Packet {
     /// Ray `i` alone.
     pub(crate) fn single(&self, i: usize) -> Self {
         let mut one = Self::new();
-        one.any_hit = self.any_hit;
+        (one.any_hit, one.culls) = (self.any_hit, self.culls);
         one.push(self.origin_of(i), self.direction_of(i));
         one.distance[0] = self.distance[i];
         one.slot[0] = self.slot[i];

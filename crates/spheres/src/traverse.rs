@@ -48,8 +48,11 @@ impl Spheres<'_> {
 /// Counts of work, for the statistics and the paper's tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Spheres that were culled or tested.
+    /// Spheres in the cells that packets overlap: culled or tested ("potential tests", Gribble et al.
+    /// 2007, Table 5).
     pub spheres: u64,
+    /// Those of them that were tested.
+    pub tested: u64,
     /// Ray–sphere tests.
     pub tests: u64,
 }
@@ -58,6 +61,7 @@ impl Counts {
     /// Adds another count.
     pub fn add(&mut self, other: Self) {
         self.spheres += other.spheres;
+        self.tested += other.tested;
         self.tests += other.tests;
     }
 }
@@ -254,7 +258,10 @@ impl<S: Simd> Walk<'_, S> {
                 }
             }
             self.counts.spheres += count as u64;
-            may &= cull(simd, &self.cull, &self.frustum, (self.room.grid, slot), self.reach);
+            if self.packet.culls {
+                may &= cull(simd, &self.cull, &self.frustum, (self.room.grid, slot), self.reach);
+            }
+            self.counts.tested += u64::from(may.count_ones());
             let mut nearer = false;
             while may != 0 {
                 let place = slot + may.trailing_zeros() as usize;

@@ -289,3 +289,28 @@ fn wide_and_parallel_and_scattered_rays() {
         .collect();
     check_all("scattered", &scene, &scattered);
 }
+
+#[test]
+fn culling_spares_tests_and_changes_no_hit() {
+    let mut random = Random(77);
+    let scene = Scene::new((0..4000).map(|_| (random.point(), 0.01 + 0.02 * random.unit())));
+    let classes =
+        RadiusClasses::build(&scene.positions, Radii::Each(&scene.radii), Params::default());
+    let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
+    let spheres = [Spheres { classes: &classes, visible: &visible }];
+    let (mut culling, mut testing) = (Packet::new(), Packet::new());
+    testing.test_all();
+    for (origin, direction) in rays(Vec3::new(3.0, 2.0, 1.0), Vec3::splat(0.5), 0.1, 8) {
+        culling.push(origin, direction);
+        testing.push(origin, direction);
+    }
+    let (mut fewer, mut more) = (Counts::default(), Counts::default());
+    let level = Level::new();
+    dispatch!(level, simd => trace(simd, &mut culling, &spheres, &mut fewer));
+    dispatch!(level, simd => trace(simd, &mut testing, &spheres, &mut more));
+    assert!((0..64).all(|i| culling.hit(i) == testing.hit(i)));
+    assert!((0..64).any(|i| culling.hit(i).is_some()));
+    assert_eq!(more.tested, more.spheres);
+    assert_eq!((fewer.tests, more.tests), (64 * fewer.tested, 64 * more.tested));
+    assert!(0 < fewer.tested && fewer.tested < fewer.spheres && fewer.spheres <= more.spheres);
+}
