@@ -8,8 +8,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::groups::groups_of;
 use crate::lattice::edge_for_count;
-use crate::{Block, Grid, Lattice, Radii};
+use crate::{Block, Grid, Lattice, Particle, Radii};
 
 /// How fine a grid is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,13 +48,6 @@ const MOST_BUCKETS: usize = 1024;
 /// Pieces the first sort is cut into. Fixed, though the result does not depend on it.
 const CHUNKS: usize = 16;
 
-/// A particle on its way: position about the grid's origin, and index in the file's order.
-#[derive(Clone, Copy, Default)]
-struct Item {
-    position: [f32; 3],
-    index: u32,
-}
-
 impl Grid {
     /// Builds a grid over those of `positions` that `chosen` lists (all, if `None`).
     ///
@@ -87,11 +81,9 @@ impl Grid {
             lattice: Lattice { low: Vec3::ZERO, edge: 1.0, dims: [1, 1, 1] },
             blocks: vec![Block::default(); 2],
             cell_starts: vec![0],
-            x: Vec::new(),
-            y: Vec::new(),
-            z: Vec::new(),
+            groups: Vec::new(),
+            particles: Vec::new(),
             radius: Radii::Uniform(0.0),
-            index: Vec::new(),
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
             least_radius: 0.0,
@@ -102,7 +94,7 @@ impl Grid {
 
     /// The second sort: every bucket by itself.
     fn from_buckets(
-        items: &[Item],
+        items: &[Particle],
         bucket_starts: &[usize],
         lattice: Lattice,
         (radii, params): (Radii<&[f32]>, Params),
@@ -132,8 +124,7 @@ impl Grid {
         let n = particles as usize;
         let mut cell_starts = vec![0; cells as usize + 1];
         cell_starts[cells as usize] = particles;
-        let (mut x, mut y, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let mut index = vec![0; n];
+        let mut sorted = vec![Particle::default(); n];
         let mut radius = match radii {
             Radii::Uniform(_) => Vec::new(),
             Radii::Each(_) => vec![0.0; n],
@@ -143,14 +134,11 @@ impl Grid {
             block_starts.iter().map(|b| blocks[*b].first_cell as usize).collect();
         let no_radii = vec![0; buckets + 1];
         let radius_bounds = if radius.is_empty() { &no_radii[..] } else { bucket_starts };
-        let out = split(&mut x, bucket_starts)
+        let out = split(&mut sorted, bucket_starts)
             .into_iter()
-            .zip(split(&mut y, bucket_starts))
-            .zip(split(&mut z, bucket_starts))
-            .zip(split(&mut index, bucket_starts))
             .zip(split(&mut radius, radius_bounds))
             .zip(split(&mut cell_starts, &cell_bounds))
-            .map(|(((((x, y), z), index), radius), cells)| Slots { x, y, z, index, radius, cells })
+            .map(|((particles, radius), cells)| Slots { particles, radius, cells })
             .collect::<Vec<_>>();
         let crowded = out
             .into_par_iter()
@@ -173,13 +161,11 @@ impl Grid {
                 Radii::Uniform(r) => Radii::Uniform(r),
                 Radii::Each(_) => Radii::Each(radius),
             },
+            groups: groups_of(&lattice, &blocks),
             lattice,
             blocks,
             cell_starts,
-            x,
-            y,
-            z,
-            index,
+            particles: sorted,
             crowded,
         }
     }
@@ -197,11 +183,11 @@ impl Source<'_> {
     }
 
     /// The finite ones among items `range`.
-    fn items(&self, range: std::ops::Range<usize>) -> impl Iterator<Item = Item> {
+    fn items(&self, range: std::ops::Range<usize>) -> impl Iterator<Item = Particle> {
         range.filter_map(|i| {
             let index = self.chosen.map_or(i as u32, |chosen| chosen[i]);
-            let position = self.positions[index as usize];
-            position.iter().all(|v| v.is_finite()).then_some(Item { position, index })
+            let center = self.positions[index as usize];
+            center.iter().all(|v| v.is_finite()).then_some(Particle { center, index })
         })
     }
 
@@ -217,7 +203,7 @@ impl Source<'_> {
             .into_par_iter()
             .map(|chunk| {
                 self.items(self.chunk(chunk)).fold(none(), |(low, high, n), item| {
-                    let p = Vec3::from_array(item.position);
+                    let p = Vec3::from_array(item.center);
                     (low.min(p), high.max(p), n + 1)
                 })
             })
@@ -252,7 +238,7 @@ fn sort_into_buckets(
     source: &Source<'_>,
     lattice: &Lattice,
     count: usize,
-) -> (Vec<Item>, Vec<usize>) {
+) -> (Vec<Particle>, Vec<usize>) {
     let blocks = lattice.count();
     let buckets = (count / BUCKET_PARTICLES).clamp(1, MOST_BUCKETS).min(blocks);
     let bucket_of = |p: [f32; 3]| {
@@ -264,15 +250,15 @@ fn sort_into_buckets(
         .map(|chunk| {
             let mut counts = vec![0; buckets];
             for item in source.items(source.chunk(chunk)) {
-                counts[bucket_of(item.position)] += 1;
+                counts[bucket_of(item.center)] += 1;
             }
             counts
         })
         .collect();
 
     // Cut the output into one piece per bucket and chunk, in that order, and hand each chunk its own.
-    let mut items = vec![Item::default(); count];
-    let mut pieces: Vec<Vec<std::slice::IterMut<'_, Item>>> =
+    let mut items = vec![Particle::default(); count];
+    let mut pieces: Vec<Vec<std::slice::IterMut<'_, Particle>>> =
         (0..CHUNKS).map(|_| Vec::with_capacity(buckets)).collect();
     let mut bucket_starts = Vec::with_capacity(buckets + 1);
     let mut start = 0;
@@ -289,7 +275,7 @@ fn sort_into_buckets(
     bucket_starts.push(start);
     pieces.into_par_iter().enumerate().for_each(|(chunk, mut pieces)| {
         for item in source.items(source.chunk(chunk)) {
-            if let Some(place) = pieces[bucket_of(item.position)].next() {
+            if let Some(place) = pieces[bucket_of(item.center)].next() {
                 *place = item;
             }
         }
@@ -299,7 +285,7 @@ fn sort_into_buckets(
 
 /// Counts the particles of each block (into `first`) and finds their bounds and radii.
 fn measure_blocks(
-    bucket: &[Item],
+    bucket: &[Particle],
     lattice: &Lattice,
     first_block: usize,
     blocks: &mut [Block],
@@ -310,7 +296,7 @@ fn measure_blocks(
         block.least_radius = f32::INFINITY;
     }
     for item in bucket {
-        let p = Vec3::from_array(item.position);
+        let p = Vec3::from_array(item.center);
         let block = &mut blocks[lattice.index(lattice.block_of(p)) - first_block];
         block.first += 1;
         block.low = block.low.min(p);
@@ -352,10 +338,7 @@ fn divide(block: &mut Block, count: u32, params: Params, block_edge: f64) {
 
 /// The places of one bucket in the grid's arrays.
 struct Slots<'a> {
-    x: &'a mut [f32],
-    y: &'a mut [f32],
-    z: &'a mut [f32],
-    index: &'a mut [u32],
+    particles: &'a mut [Particle],
     /// Empty where all radii are equal.
     radius: &'a mut [f32],
     cells: &'a mut [u32],
@@ -365,7 +348,7 @@ impl Slots<'_> {
     /// The second sort, of one bucket. `blocks` are the bucket's and one more. Gives the crowded ones.
     fn fill(
         &mut self,
-        bucket: &[Item],
+        bucket: &[Particle],
         blocks: &[Block],
         lattice: &Lattice,
         (first_block, radii): (usize, Radii<&[f32]>),
@@ -373,21 +356,21 @@ impl Slots<'_> {
         let (first, first_cell) = (blocks[0].first, blocks[0].first_cell);
         let mut crowded = Vec::new();
         let mut next: Vec<u32> = blocks.iter().map(|b| b.first - first).collect();
-        let mut by_block = vec![Item::default(); bucket.len()];
+        let mut by_block = vec![Particle::default(); bucket.len()];
         for item in bucket {
-            let block = lattice.index(lattice.block_of(Vec3::from_array(item.position)));
+            let block = lattice.index(lattice.block_of(Vec3::from_array(item.center)));
             let place = &mut next[block - first_block];
             by_block[*place as usize] = *item;
             *place += 1;
         }
-        let mut by_cell: Vec<Item> = Vec::new();
+        let mut by_cell: Vec<Particle> = Vec::new();
         for (b, pair) in blocks.windows(2).enumerate().filter(|(_, pair)| pair[0].cells[0] > 0) {
             let block = &pair[0];
             let range = (block.first - first) as usize..(pair[1].first - first) as usize;
             let cells = (block.first_cell - first_cell) as usize
                 ..(pair[1].first_cell - first_cell) as usize;
             let items = &by_block[range.clone()];
-            by_cell.resize(items.len(), Item::default());
+            by_cell.resize(items.len(), Particle::default());
             let starts = &mut self.cells[cells];
             sort_block(items, &mut by_cell, starts, block);
             if items.len() > CROWDED_CELL && sort_crowded(&mut by_cell, starts, radii) {
@@ -397,8 +380,7 @@ impl Slots<'_> {
                 *start += block.first;
             }
             for (item, slot) in by_cell.iter().zip(range) {
-                [self.x[slot], self.y[slot], self.z[slot]] = item.position;
-                self.index[slot] = item.index;
+                self.particles[slot] = *item;
                 if let Radii::Each(each) = radii {
                     self.radius[slot] = each[item.index as usize];
                 }
@@ -409,11 +391,11 @@ impl Slots<'_> {
 }
 
 /// Sorts the items of a block by cell; fills `starts`, counted from zero.
-fn sort_block(items: &[Item], sorted: &mut [Item], starts: &mut [u32], block: &Block) {
+fn sort_block(items: &[Particle], sorted: &mut [Particle], starts: &mut [u32], block: &Block) {
     let [nx, ny, nz] = block.cells;
     let scale = 1.0 / block.cell_edge;
-    let cell_of = |item: &Item| {
-        let at = (Vec3::from_array(item.position) - block.cell_low) * scale;
+    let cell_of = |item: &Particle| {
+        let at = (Vec3::from_array(item.center) - block.cell_low) * scale;
         let x = (at.x as u32).min(nx - 1);
         let y = (at.y as u32).min(ny - 1);
         let z = (at.z as u32).min(nz - 1);
@@ -439,8 +421,8 @@ fn sort_block(items: &[Item], sorted: &mut [Item], starts: &mut [u32], block: &B
 
 /// Brings equal spheres of crowded cells side by side, the lower index first. Gives whether some
 /// coincide.
-fn sort_crowded(sorted: &mut [Item], starts: &[u32], radii: Radii<&[f32]>) -> bool {
-    let radius = |item: &Item| match radii {
+fn sort_crowded(sorted: &mut [Particle], starts: &[u32], radii: Radii<&[f32]>) -> bool {
+    let radius = |item: &Particle| match radii {
         Radii::Uniform(_) => 0,
         Radii::Each(each) => each[item.index as usize].to_bits(),
     };
@@ -449,8 +431,8 @@ fn sort_crowded(sorted: &mut [Item], starts: &[u32], radii: Radii<&[f32]>) -> bo
         let end = starts.get(c + 1).map_or(sorted.len(), |s| *s as usize);
         let cell = &mut sorted[starts[c] as usize..end];
         if cell.len() > CROWDED_CELL {
-            cell.sort_unstable_by_key(|i| (i.position.map(f32::to_bits), radius(i), i.index));
-            coincide |= cell.windows(2).any(|w| w[0].position == w[1].position);
+            cell.sort_unstable_by_key(|i| (i.center.map(f32::to_bits), radius(i), i.index));
+            coincide |= cell.windows(2).any(|w| w[0].center == w[1].center);
         }
     }
     coincide

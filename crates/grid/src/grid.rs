@@ -1,8 +1,9 @@
 //! The grid itself: blocks, cells, and the particles in cell order.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::Lattice;
+use crate::{Group, Lattice};
 
 /// Radii of particles, all equal or one each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +12,16 @@ pub enum Radii<T = Vec<f32>> {
     Uniform(f32),
     /// One each.
     Each(T),
+}
+
+/// A particle of the grid: 16 bytes, so that four fill a line of cache.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Particle {
+    /// Its centre, about the grid's origin.
+    pub center: [f32; 3],
+    /// Its index in the file's own order.
+    pub index: u32,
 }
 
 /// A block of cells of the lattice (Gribble's macrocell, Chaudhari's block).
@@ -49,18 +60,14 @@ pub struct Grid {
     pub lattice: Lattice,
     /// One per place of the lattice, x fastest, and one more that closes the last.
     pub blocks: Vec<Block>,
+    /// The groups of blocks that hold particles, x fastest.
+    pub groups: Vec<Group>,
     /// First particle of each cell, block after block, and the number of particles at the end.
     pub cell_starts: Vec<u32>,
-    /// x of each particle's centre, in cell order.
-    pub x: Vec<f32>,
-    /// y of each particle's centre.
-    pub y: Vec<f32>,
-    /// z of each particle's centre.
-    pub z: Vec<f32>,
+    /// The particles in cell order.
+    pub particles: Vec<Particle>,
     /// Radii in cell order.
     pub radius: Radii,
-    /// Each particle's index in the file's own order.
-    pub index: Vec<u32>,
     /// Least coordinates of all centres; +∞ without particles.
     pub low: Vec3,
     /// Greatest coordinates of all centres; −∞ without particles.
@@ -76,12 +83,12 @@ pub struct Grid {
 impl Grid {
     /// How many particles the grid holds.
     pub fn len(&self) -> usize {
-        self.index.len()
+        self.particles.len()
     }
 
     /// Whether it holds none.
     pub fn is_empty(&self) -> bool {
-        self.index.is_empty()
+        self.particles.is_empty()
     }
 
     /// The particles of block `block`, as a range of the cell order.
@@ -96,7 +103,12 @@ impl Grid {
 
     /// The centre of the particle at `slot` of the cell order.
     pub fn center(&self, slot: usize) -> Vec3 {
-        Vec3::new(self.x[slot], self.y[slot], self.z[slot])
+        Vec3::from_array(self.particles[slot].center)
+    }
+
+    /// The index, in the file's own order, of the particle at `slot` of the cell order.
+    pub fn index(&self, slot: usize) -> u32 {
+        self.particles[slot].index
     }
 
     /// The radius of the particle at `slot` of the cell order.
@@ -110,12 +122,13 @@ impl Grid {
     /// Bytes of the particle data itself: positions, and radii where they differ.
     pub fn data_bytes(&self) -> usize {
         let radii = if let Radii::Each(r) = &self.radius { r.len() * 4 } else { 0 };
-        self.x.len() * 12 + radii
+        self.particles.len() * 12 + radii
     }
 
-    /// Bytes beyond the particle data: index, cells, blocks.
+    /// Bytes beyond the particle data: index, cells, blocks and their groups.
     pub fn structure_bytes(&self) -> usize {
-        (self.index.len() + self.cell_starts.len() + self.crowded.len()) * 4
+        (self.particles.len() + self.cell_starts.len() + self.crowded.len()) * 4
             + self.blocks.len() * size_of::<Block>()
+            + self.groups.len() * size_of::<Group>()
     }
 }

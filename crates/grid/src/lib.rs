@@ -2,17 +2,18 @@
 //!
 //! Gribble et al. 2007, §4.1–4.2: each particle lies in exactly one cell, that of its centre
 //! (*sphere-center method*); particles are stored in cell order; blocks of M³ cells (*macrocells*)
-//! carry counts and least and greatest values. [`Visibility`] says which particles are to be seen;
+//! carry counts and least and greatest values, and so do groups of 4³ blocks. [`Visibility`] says which particles are to be seen;
 //! changing it rebuilds nothing.
 //!
 //! # Invariants
 //! - A [`Grid`] owns the positions and radii in cell order; columns stay in file order behind
-//!   [`Grid::index`].
+//!   [`Particle::index`].
 //! - The same particles give the same grid, bit for bit, for any number of threads.
 
 mod build;
 mod classes;
 mod grid;
+mod groups;
 mod lattice;
 mod neighbors;
 mod ranges;
@@ -20,7 +21,8 @@ mod visibility;
 
 pub use build::{Params, Resolution};
 pub use classes::RadiusClasses;
-pub use grid::{Block, Grid, Radii};
+pub use grid::{Block, Grid, Particle, Radii};
+pub use groups::{GROUP_EDGE, Group};
 pub use lattice::Lattice;
 pub use ranges::BlockRanges;
 pub use visibility::{Filter, Seen, Visibility};

@@ -94,5 +94,6 @@ impl Grid {
         for block in self.blocks.iter_mut().filter(|b| b.cells[0] > 0) {
             (block.least_radius, block.greatest_radius) = (radius, radius);
         }
+        self.groups.iter_mut().for_each(|g| g.greatest_radius = radius);
     }
 }

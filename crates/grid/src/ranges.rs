@@ -20,9 +20,9 @@ impl BlockRanges {
             .into_par_iter()
             .with_min_len(64)
             .map(|block| {
-                grid.index[grid.particles_of(block)]
+                grid.particles[grid.particles_of(block)]
                     .iter()
-                    .map(|i| value(*i))
+                    .map(|p| value(p.index))
                     .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
                         (low.min(v), high.max(v))
                     })

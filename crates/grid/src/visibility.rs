@@ -174,7 +174,7 @@ fn state_of(
     let (mut visible, mut drawn) = (0, 0);
     let mut last_drawn: Option<usize> = None;
     for (i, slot) in slots.clone().enumerate() {
-        let index = grid.index[slot];
+        let index = grid.index(slot);
         if !filters.iter().all(|f| f.passes(index)) || !keep.is_none_or(|keep| keep(index)) {
             continue;
         }

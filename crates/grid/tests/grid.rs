@@ -1,7 +1,9 @@
 //! The grid against its definition, on easy and on hard inputs.
 
+use glam::Vec3;
 use motes_grid::{
-    BlockRanges, Filter, Grid, Params, Radii, RadiusClasses, Resolution, Seen, Visibility,
+    BlockRanges, Filter, GROUP_EDGE, Grid, Params, Radii, RadiusClasses, Resolution, Seen,
+    Visibility,
 };
 
 /// Uniform numbers in 0..1 from a 64-bit mixer (splitmix64): the same in every run.
@@ -22,7 +24,7 @@ fn cloud(n: usize, seed: u64) -> Vec<[f32; 3]> {
 
 /// Each finite particle lies in exactly one cell, and inside that cell; blocks tell the truth.
 fn check(grid: &Grid, positions: &[[f32; 3]]) {
-    let mut seen: Vec<u32> = grid.index.clone();
+    let mut seen: Vec<u32> = grid.particles.iter().map(|p| p.index).collect();
     seen.sort_unstable();
     let expected: Vec<u32> = (0..positions.len() as u32)
         .filter(|i| positions[*i as usize].iter().all(|v| v.is_finite()))
@@ -40,7 +42,7 @@ fn check(grid: &Grid, positions: &[[f32; 3]]) {
             let at = [c % nx, c / nx % ny, c / (nx * ny)];
             for slot in grid.cell_starts[place] as usize..grid.cell_starts[place + 1] as usize {
                 let p = grid.center(slot);
-                assert_eq!(p.to_array(), positions[grid.index[slot] as usize]);
+                assert_eq!(p.to_array(), positions[grid.index(slot) as usize]);
                 assert!(p.cmpge(block.low).all() && p.cmple(block.high).all());
                 for axis in 0..3 {
                     let low = block.cell_low[axis] + at[axis] as f32 * block.cell_edge;
@@ -51,9 +53,35 @@ fn check(grid: &Grid, positions: &[[f32; 3]]) {
     }
 }
 
+/// Groups tell of exactly the blocks below them.
+fn check_groups(grid: &Grid) {
+    let mut seen = Vec::new();
+    for group in &grid.groups {
+        assert!(group.first_block.iter().all(|f| f % GROUP_EDGE == 0) && group.occupied != 0);
+        let blocks: Vec<usize> = group.blocks(&grid.lattice).collect();
+        let own = |b: &usize| grid.blocks[*b];
+        for b in &blocks {
+            let from = grid.lattice.block_at(*b);
+            assert!((0..3).all(|i| from[i] / GROUP_EDGE == group.first_block[i] / GROUP_EDGE));
+        }
+        let low = blocks.iter().map(|b| own(b).low).fold(Vec3::INFINITY, Vec3::min);
+        let high = blocks.iter().map(|b| own(b).high).fold(Vec3::NEG_INFINITY, Vec3::max);
+        let radius = blocks.iter().map(|b| own(b).greatest_radius).fold(0.0, f32::max);
+        let particles: usize = blocks.iter().map(|b| grid.particles_of(*b).len()).sum();
+        assert_eq!((group.low, group.high, group.greatest_radius), (low, high, radius));
+        assert_eq!(group.particles as usize, particles);
+        seen.extend(blocks);
+    }
+    seen.sort_unstable();
+    let occupied: Vec<usize> =
+        (0..grid.blocks.len() - 1).filter(|b| !grid.is_empty_block(*b)).collect();
+    assert_eq!(seen, occupied);
+}
+
 fn build(positions: &[[f32; 3]]) -> Grid {
     let grid = Grid::build(positions, Radii::Uniform(0.001), None, Params::default());
     check(&grid, positions);
+    check_groups(&grid);
     grid
 }
 
@@ -114,7 +142,7 @@ fn any_number_of_threads_builds_the_same_grid() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let grid =
             pool.install(|| Grid::build(&positions, Radii::Each(&radii), None, Params::default()));
-        (grid.index, grid.cell_starts, grid.x, grid.radius)
+        (grid.particles, grid.cell_starts, grid.blocks, grid.groups, grid.radius)
     };
     let one = with(1);
     assert!(one == with(2) && one == with(3) && one == with(7));
@@ -147,7 +175,7 @@ fn radii_over_six_decades_fall_into_classes() {
     assert!(classes.grids.len() >= 10);
     for grid in &classes.grids {
         assert!(grid.greatest_radius <= 4.0 * grid.least_radius);
-        assert!((0..grid.len()).all(|s| grid.radius_at(s) == radii[grid.index[s] as usize]));
+        assert!((0..grid.len()).all(|s| grid.radius_at(s) == radii[grid.index(s) as usize]));
     }
     let equal = vec![0.5; 100];
     let classes = RadiusClasses::build(&positions[..100], Radii::Each(&equal), Params::default());
@@ -160,12 +188,12 @@ fn seen(grid: &Grid, visibility: &Visibility) -> Vec<u32> {
         let slots = grid.particles_of(b);
         match visibility.block(grid, b) {
             Seen::Hidden => {}
-            Seen::Shown => all.extend(&grid.index[slots]),
+            Seen::Shown => all.extend(slots.map(|s| grid.index(s))),
             Seen::Mixed(words) => all.extend(
                 slots
                     .enumerate()
                     .filter(|(i, _)| words[i / 64] >> (i % 64) & 1 == 1)
-                    .map(|(_, s)| grid.index[s]),
+                    .map(|(_, s)| grid.index(s)),
             ),
         }
     }

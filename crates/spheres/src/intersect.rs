@@ -9,7 +9,7 @@
 use fearless_simd::{f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_grid::Grid;
+use motes_grid::{Grid, Particle};
 
 use crate::frustum::Frustum;
 use crate::packet::{BLOCKED, LANES, NO_SLOT, Packet};
@@ -159,11 +159,9 @@ pub(crate) fn cull<S: Simd>(
     (grid, slot): (&Grid, usize),
     reach: f32,
 ) -> u64 {
-    let coordinates = [&grid.x, &grid.y, &grid.z];
+    let centers = sixteen_centers(simd, &grid.particles, slot);
     let [k, u, v] = frustum.axes;
-    let k = sixteen(simd, coordinates[k], slot);
-    let u = sixteen(simd, coordinates[u], slot);
-    let v = sixteen(simd, coordinates[v], slot);
+    let (k, u, v) = (centers[k], centers[u], centers[v]);
     let radius = match &grid.radius {
         motes_grid::Radii::Uniform(r) => f32x16::splat(simd, *r),
         motes_grid::Radii::Each(radii) => sixteen(simd, radii, slot),
@@ -192,6 +190,30 @@ fn load<S: Simd>(simd: S, from: &[f32], first: usize) -> f32x16<S> {
 #[inline(always)]
 fn splat<S: Simd>(simd: S, value: f32) -> f32x16<S> {
     f32x16::splat(simd, value)
+}
+
+/// x, y and z of sixteen particles from `at` on; past the end the last one repeats.
+#[inline(always)]
+fn sixteen_centers<S: Simd>(simd: S, from: &[Particle], at: usize) -> [f32x16<S>; 3] {
+    match from.get(at..at + LANES) {
+        Some(particles) => transposed(simd, bytemuck::cast_slice(particles)),
+        None => {
+            let mut padded = [from[from.len() - 1]; LANES];
+            let rest = &from[at..];
+            padded[..rest.len()].copy_from_slice(rest);
+            transposed(simd, bytemuck::cast_slice(&padded))
+        }
+    }
+}
+
+/// x, y and z of sixteen particles, four numbers each.
+#[inline(always)]
+fn transposed<S: Simd>(simd: S, numbers: &[f32]) -> [f32x16<S>; 3] {
+    // xyzi xyzi … becomes xzxz … and yiyi …, and these x …, z … and y ….
+    let (xz0, yi0) = load(simd, numbers, 0).deinterleave(load(simd, numbers, LANES));
+    let (xz1, yi1) = load(simd, numbers, 2 * LANES).deinterleave(load(simd, numbers, 3 * LANES));
+    let (x, z) = xz0.deinterleave(xz1);
+    [x, yi0.unzip_low(yi1), z]
 }
 
 /// Sixteen values from `at` on; past the end the last one repeats.

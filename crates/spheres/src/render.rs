@@ -239,7 +239,7 @@ impl Surface {
         // Rounding cannot flip it: a grazing ray's normal is at a right angle to the ray at most.
         let inside = (grid.center(place) - packet.origin_of(ray)).length() < radius;
         let normal = outward.normalize_or(-direction) * if inside { -1.0 } else { 1.0 };
-        Some(Self { distance, position, radius, normal, index: grid.index[place], system })
+        Some(Self { distance, position, radius, normal, index: grid.index(place), system })
     }
 
     /// The point where secondary rays start.

@@ -41,7 +41,7 @@ impl Spheres<'_> {
     /// A sphere's index in the file's own order.
     pub fn index(&self, slot: u32) -> u32 {
         let (grid, place) = self.locate(slot);
-        grid.index[place]
+        grid.index(place)
     }
 }
 
