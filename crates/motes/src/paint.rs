@@ -117,6 +117,14 @@ impl Paint {
         Ok(Self { particles: particles.clone(), how, meaning })
     }
 
+    /// The one colour of all particles, if they have one.
+    pub fn uniform(&self) -> Option<Vec3> {
+        match &self.how {
+            How::Uniform(color) => Some(*color),
+            _ => None,
+        }
+    }
+
     /// The colour of particle `index`, linear RGB.
     pub fn color(&self, index: u32) -> Vec3 {
         match &self.how {

@@ -9,7 +9,7 @@ use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, RangeOver, Resolved, Scene, Show};
-use motes_spheres::{Center, Settings, Spheres, View};
+use motes_spheres::{Center, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
 use crate::paint::{Meaning, find_property};
@@ -269,6 +269,10 @@ impl Session {
         let settings = Settings {
             size: (image.width, image.height),
             samples: image.samples,
+            primary: match self.scene.spheres.primary {
+                motes_scene::Primary::Project => Primary::Project,
+                motes_scene::Primary::Trace => Primary::Trace,
+            },
             packet: self.scene.spheres.packet,
             layers,
             level,
@@ -310,6 +314,10 @@ struct Paints<'a>(&'a [Loaded]);
 impl motes_spheres::Paint for Paints<'_> {
     fn color(&self, system: u16, index: u32) -> Vec3 {
         self.0[system as usize].paint.color(index)
+    }
+
+    fn uniform(&self, system: u16) -> Option<Vec3> {
+        self.0[system as usize].paint.uniform()
     }
 }
 

@@ -40,7 +40,7 @@ pub use elements::Element;
 pub use error::{Result, SceneError, nearest};
 pub use resolve::{Background, KeyLight, Lights, Resolved};
 pub use scene::{
-    Axis, Camera, ColorBy, Coloring, Component, Filter, Image, Light, Overlay, Palette, Projection,
-    RangeOver, RelativeTo, Scene, Show, Spheres, System, Tone,
+    Axis, Camera, ColorBy, Coloring, Component, Filter, Image, Light, Overlay, Palette, Primary,
+    Projection, RangeOver, RelativeTo, Scene, Show, Spheres, System, Tone,
 };
 pub use settings::{Field, Setting, Shape};

@@ -173,8 +173,10 @@ settings! {
 }
 
 settings! {
-    /// The spheres renderer: coherent grid traversal.
+    /// The spheres renderer.
     pub struct Spheres {
+        /// How what the eye sees first is found: project (blocks of the grid, front to back) or trace (packets of rays, the paper's way). Changes the speed, never the picture.
+        primary: Primary = Primary::Project,
         /// Side of a packet of rays, pixels: 2, 4, 8 or 16 (the paper's packets). Changes the speed, never the picture.
         packet: u32 = 8,
         /// Grid density: cells for each particle (the paper's λ). Changes the speed, never the picture.
@@ -255,6 +257,16 @@ words! {
         Tableau = "tableau",
         /// Okabe and Ito's colours.
         OkabeIto = "okabe-ito",
+    }
+}
+
+words! {
+    /// How first hits are found.
+    pub enum Primary {
+        /// By projection.
+        Project = "project",
+        /// By tracing packets.
+        Trace = "trace",
     }
 }
 

@@ -6,10 +6,10 @@
 //!
 //! Fused multiply-adds are exact ones on every instruction set, so that all give the same bits.
 
-use fearless_simd::{f32x16, prelude::*, u32x16};
+use fearless_simd::{f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_grid::{Grid, Particle};
+use motes_grid::Grid;
 
 use crate::frustum::Frustum;
 use crate::packet::{BLOCKED, LANES, NO_SLOT, Packet};
@@ -23,6 +23,30 @@ pub struct Sphere {
     pub radius: f32,
     /// Slot in the system's grids, or whatever else tells it from the others.
     pub slot: u32,
+}
+
+/// Where sixteen rays meet spheres of squared radius `r2`, whose centres lie at `oc` from where the rays
+/// start: distances, and which rays meet theirs at all.
+#[inline(always)]
+pub(crate) fn meet<S: Simd>(
+    simd: S,
+    oc: [f32x16<S>; 3],
+    direction: [f32x16<S>; 3],
+    r2: f32x16<S>,
+) -> (f32x16<S>, mask32x16<S>) {
+    let ([ox, oy, oz], [dx, dy, dz]) = (oc, direction);
+    let zero = f32x16::splat(simd, 0.0);
+    let b = oz.mul_add_precise(dz, oy.mul_add_precise(dy, ox * dx));
+    let minus_b = -b;
+    let px = minus_b.mul_add_precise(dx, ox);
+    let py = minus_b.mul_add_precise(dy, oy);
+    let pz = minus_b.mul_add_precise(dz, oz);
+    let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
+    let meets = inside.simd_ge(zero);
+    let half = inside.max(zero).sqrt();
+    let entry = b - half;
+    let distance = entry.simd_gt(zero).select(entry, b + half);
+    (distance, meets & distance.simd_gt(zero))
 }
 
 /// Tests all rays of the packet against one sphere and keeps nearer hits. Gives whether there were
@@ -52,20 +76,7 @@ pub fn intersect<S: Simd>(
         let ox = cx - load(simd, &packet.origin[0], first);
         let oy = cy - load(simd, &packet.origin[1], first);
         let oz = cz - load(simd, &packet.origin[2], first);
-        let b = oz.mul_add_precise(dz, oy.mul_add_precise(dy, ox * dx));
-        let minus_b = -b;
-        let px = minus_b.mul_add_precise(dx, ox);
-        let py = minus_b.mul_add_precise(dy, oy);
-        let pz = minus_b.mul_add_precise(dz, oz);
-        let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
-        let meets = inside.simd_ge(zero);
-        if !meets.any_true() {
-            continue;
-        }
-        let half = inside.max(zero).sqrt();
-        let entry = b - half;
-        let distance = entry.simd_gt(zero).select(entry, b + half);
-        let hit = meets & distance.simd_gt(zero);
+        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
         let nearer = hit & distance.simd_lt(before);
         let ties = (hit & distance.simd_eq(before)).to_bitmask();
         if packet.any_hit {
@@ -159,13 +170,10 @@ pub(crate) fn cull<S: Simd>(
     (grid, slot): (&Grid, usize),
     reach: f32,
 ) -> u64 {
-    let centers = sixteen_centers(simd, &grid.particles, slot);
+    let centers = sixteen_centers(simd, grid, slot);
     let [k, u, v] = frustum.axes;
     let (k, u, v) = (centers[k], centers[u], centers[v]);
-    let radius = match &grid.radius {
-        motes_grid::Radii::Uniform(r) => f32x16::splat(simd, *r),
-        motes_grid::Radii::Each(radii) => sixteen(simd, radii, slot),
-    };
+    let radius = radii_at(simd, grid, slot);
     let along = k - f32x16::splat(simd, frustum.k_start);
     let u_shift = radius.mul_add(planes.widen[0], planes.pad);
     let v_shift = radius.mul_add(planes.widen[1], planes.pad);
@@ -194,7 +202,8 @@ fn splat<S: Simd>(simd: S, value: f32) -> f32x16<S> {
 
 /// x, y and z of sixteen particles from `at` on; past the end the last one repeats.
 #[inline(always)]
-fn sixteen_centers<S: Simd>(simd: S, from: &[Particle], at: usize) -> [f32x16<S>; 3] {
+pub(crate) fn sixteen_centers<S: Simd>(simd: S, grid: &Grid, at: usize) -> [f32x16<S>; 3] {
+    let from = &grid.particles[..];
     match from.get(at..at + LANES) {
         Some(particles) => transposed(simd, bytemuck::cast_slice(particles)),
         None => {
@@ -222,5 +231,25 @@ fn sixteen<S: Simd>(simd: S, from: &[f32], at: usize) -> f32x16<S> {
     match from.get(at..at + LANES) {
         Some(values) => f32x16::from_slice(simd, values),
         None => f32x16::from_fn(simd, |i| from[(at + i).min(from.len() - 1)]),
+    }
+}
+
+/// Radii of the sixteen particles from `slot` on; past the end the last one repeats.
+#[inline(always)]
+pub(crate) fn radii_at<S: Simd>(simd: S, grid: &Grid, slot: usize) -> f32x16<S> {
+    match &grid.radius {
+        motes_grid::Radii::Uniform(r) => f32x16::splat(simd, *r),
+        motes_grid::Radii::Each(radii) => sixteen(simd, radii, slot),
+    }
+}
+
+/// Sixteen bits of `words` from bit `at` on.
+#[inline(always)]
+pub(crate) fn bits(words: &[u64], at: usize) -> u64 {
+    let (word, shift) = (at / 64, at % 64);
+    let low = words[word] >> shift;
+    match words.get(word + 1) {
+        Some(next) if shift > 0 => low | next << (64 - shift),
+        _ => low,
     }
 }

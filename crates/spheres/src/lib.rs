@@ -12,18 +12,26 @@
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
 //! threads, the size of packets or of tiles.
 
+mod aims;
 mod frustum;
+mod hits;
 mod intersect;
 mod occlude;
+mod overview;
 mod packet;
+mod picture;
+mod project;
 pub mod reference;
 mod render;
 mod shade;
+mod shaft;
+mod tile;
 mod traverse;
 
 pub use frustum::{Bounds, Frustum};
 pub use intersect::{Sphere, farthest, intersect};
 pub use packet::{LANES, MOST_RAYS, Packet};
-pub use render::{Center, Picture, Settings, View, render};
+pub use picture::{Picture, render};
+pub use render::{Center, Primary, Renderer, Settings, Sink, Tile, View};
 pub use shade::Paint;
 pub use traverse::{Counts, Spheres, trace};

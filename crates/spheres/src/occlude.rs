@@ -1,176 +1,517 @@
 //! How much of the key light and of the fill reaches a surface: shadow and occlusion rays.
 //!
-//! Gribble et al. 2007, §4.3, "Soft Shadows": rays from the hits of a packet to samples of an area
-//! light, in packets of their own. The rays of one packet aim at the same part of the light, each at
-//! its own point of it; all are any-hit. Ambient occlusion goes along directions that cut the sphere
-//! into parts of equal area, of which those above the surface count with the cosine. All rays of a
-//! packet share one direction, so that the packet stays as narrow as its points lie together however
-//! far it goes; neighbouring pixels, two by two, have directions of their own.
+//! Gribble et al. 2007, §4.3, "Soft Shadows": from every hit, rays to samples of an area light, all
+//! any-hit. Hits are first sorted by place, so that those of one group lie together in space (packets by
+//! pixels alone would tear at every edge), and each group sends one bundle towards the light
+//! ([`crate::shaft`]). The light's samples are parts of equal area along a spiral, which neighbouring
+//! pixels turn differently, so that no bands appear.
+//!
+//! Ambient occlusion goes along directions that cut the sphere into parts of equal area, of which those
+//! above the surface count with the cosine. All rays of a bundle share one direction, so that it stays
+//! as narrow as its points lie together, however far it goes. Neighbouring pixels, two by two, have
+//! directions of their own (interleaved sampling, Keller and Heidrich 2001); hits on the same sphere
+//! within such a square share what they see.
 
-use fearless_simd::Simd;
+use fearless_simd::{f32x16, prelude::*};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_scene::KeyLight;
+use motes_scene::{KeyLight, Projection};
 
-use crate::packet::Packet;
+use crate::aims::{Aims, TURNS};
+use crate::hits::Hits;
+use crate::packet::LANES;
 use crate::render::View;
-use crate::traverse::{Counts, trace};
+use crate::shade::Reaching;
+use crate::shaft::{Bundle, LOST};
+use crate::tile::{RayTile, TILE_RAYS};
+use crate::traverse::Counts;
 
-/// A point of a surface and the random numbers that are its own.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Point {
-    pub position: Vec3,
-    /// Unit normal, towards the viewer.
-    pub normal: Vec3,
-    /// Distance from the eye.
-    pub depth: f32,
-    /// How far from the surface rays start, so as not to meet it again by rounding.
-    pub lift: f32,
-    /// Which of the `of` samples of its pixel it belongs to.
-    pub sample: u32,
-    pub of: u32,
-    /// Place of its pixel in a square of two by two.
-    pub quarter: u32,
-    /// That square.
-    pub square: (u32, u32),
-    /// The sphere it lies on: system and index.
-    pub sphere: (u16, u32),
-    /// A hash of its pixel.
-    pub seed: u32,
+/// Edge of the cells that hits are sorted by, pixels at the least distance in the tile.
+const CELL_PIXELS: f32 = 4.0;
+/// Greatest edge of the box around a group, pixels at that distance.
+const GROUP_PIXELS: f32 = 16.0;
+/// Most hits of a group, for each sample of a pixel.
+const GROUP_POINTS: usize = 128;
+
+/// The hits of a tile, and what they look at.
+#[derive(Clone, Copy)]
+pub(crate) struct Work<'a> {
+    pub rays: &'a RayTile,
+    pub hits: &'a Hits,
+    pub view: View<'a>,
+    pub aims: &'a Aims,
+    /// The tile's first pixel.
+    pub corner: (u32, u32),
+    /// Which of a pixel's samples are the tile's: those from here on.
+    pub first_sample: u32,
 }
 
-impl Point {
-    /// What points have in common that share what they see.
-    fn near(&self) -> impl Ord {
-        (self.square, self.sample, self.sphere)
+/// Finds what reaches the hits of a tile, and keeps its buffers from one to the next.
+#[derive(Debug)]
+pub(crate) struct Occluder {
+    pub reaching: Reaching,
+    bundle: Bundle,
+    /// The hits by place: a key of their cell, and their ray.
+    order: Vec<(u32, u32)>,
+    points: Points,
+    /// Sums over each hit's rays, of visible · cosine and of cosine.
+    key: Sums,
+    fill: Sums,
+}
+
+/// Per ray of a tile, visible cosines and all cosines.
+#[derive(Debug)]
+struct Sums {
+    visible: Vec<f32>,
+    all: Vec<f32>,
+}
+
+impl Sums {
+    fn new() -> Self {
+        Self { visible: vec![0.0; TILE_RAYS], all: vec![0.0; TILE_RAYS] }
     }
 }
 
-/// What reaches a point, as parts of what would reach it in the open.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reaching {
-    /// Mean of visible · max(0, cosine) over the key light.
-    pub key: f32,
-    /// Part of the cosine-weighted sky that is open.
-    pub fill: f32,
-}
-
-/// Traces the shadow and occlusion rays of the points of a tile.
-///
-/// Points that lie together in space and belong to the same sample make a packet: their rays go the
-/// same way. Packets by pixels alone would tear at every depth discontinuity.
-#[simd]
-pub(crate) fn reaching<S: Simd>(
-    simd: S,
-    points: &[Point],
-    view: View<'_>,
-    counts: &mut Counts,
-) -> Vec<Reaching> {
-    let lights = view.lights;
-    let (key_rays, fill_rays) = (lights.key.shadow_rays, lights.occlusion_rays);
-    let open = |p: &Point| Reaching { key: open_key(&lights.key, p), fill: 1.0 };
-    let mut all: Vec<Reaching> = points.iter().map(open).collect();
-    if key_rays == 0 && fill_rays == 0 {
-        return all;
+impl Occluder {
+    pub fn new() -> Self {
+        Self {
+            reaching: Reaching::new(),
+            bundle: Bundle::default(),
+            order: Vec::new(),
+            points: Points::default(),
+            key: Sums::new(),
+            fill: Sums::new(),
+        }
     }
-    let mut rays = Rays::new();
-    // Sums of visible cosines and of all cosines, per point.
-    let mut keys = vec![(0.0, 0.0); points.len()];
-    let mut fills = vec![(0.0, 0.0); points.len()];
-    let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
-    for group in groups(points, view.rays) {
-        // All points of a group belong to the same sample, in the same quarter.
-        let Some(Point { sample, of, quarter, .. }) = group.first().map(|i| points[*i as usize])
-        else {
-            continue;
+
+    /// Finds what reaches the hits.
+    #[simd]
+    pub fn reach<S: Simd>(&mut self, simd: S, work: Work<'_>, counts: &mut Counts) {
+        self.open(work.hits, &work.view.lights.key);
+        let (shadows, occlusion) = (work.aims.key_rays > 0, work.aims.fill_rays > 0);
+        if !shadows && !occlusion {
+            return;
+        }
+        let pixel = self.sort(work);
+        let mut rest = 0;
+        while rest < self.order.len() {
+            let (from, to) = (rest, self.group(work, (rest, GROUP_PIXELS * pixel)));
+            if shadows {
+                self.shadow(simd, work, (from, to), counts);
+            }
+            if occlusion {
+                self.occlude(simd, work, (from, to), counts);
+            }
+            rest = to;
+        }
+        if shadows {
+            share(work, &self.key, &mut self.reaching.key, true);
+        }
+        if occlusion {
+            share(work, &self.fill, &mut self.reaching.fill, false);
+        }
+    }
+
+    /// What reaches the hits in the open.
+    #[inline(always)]
+    fn open(&mut self, hits: &Hits, key: &KeyLight) {
+        let sin_half_angle = (1.0 - key.cos_half_angle * key.cos_half_angle).max(0.0).sqrt();
+        let [nx, ny, nz] = &hits.normal;
+        for block in (0..TILE_RAYS / LANES).filter(|block| hits.mask[*block] != 0) {
+            for ray in block * LANES..(block + 1) * LANES {
+                let d = key.direction;
+                let cosine = nx[ray] * d.x + ny[ray] * d.y + nz[ray] * d.z;
+                self.reaching.key[ray] = lit(cosine, sin_half_angle);
+                self.reaching.fill[ray] = 1.0;
+            }
+        }
+    }
+
+    /// Sorts the hits by place. Gives the size of a pixel at the least distance.
+    fn sort(&mut self, work: Work<'_>) -> f32 {
+        let Work { rays, hits, view, .. } = work;
+        self.order.clear();
+        let (mut low, mut depth) = (Vec3::INFINITY, f32::INFINITY);
+        for block in 0..TILE_RAYS / LANES {
+            let mut left = hits.mask[block];
+            while left != 0 {
+                let ray = block * LANES + left.trailing_zeros() as usize;
+                left &= left - 1;
+                low = low.min(hits.position_of(ray));
+                depth = depth.min(rays.distance[ray]);
+                self.order.push((0, ray as u32));
+            }
+        }
+        let pixel = match view.rays.projection {
+            Projection::Perspective => view.rays.pixel * depth,
+            Projection::Orthographic => view.rays.pixel,
         };
-        for ray in 0..key_rays {
-            let place = (ray * of + sample, key_rays * of);
-            rays.gather(points, &group, |p| key_direction(&light, p, place), f32::INFINITY);
-            trace(simd, &mut rays.packet, view.systems, counts);
-            rays.scatter(&group, &mut keys);
+        let per_cell = 1.0 / (pixel * CELL_PIXELS);
+        for (key, ray) in &mut self.order {
+            // 10 bits an axis; farther cells share the last. `as` saturates.
+            let at = (hits.position_of(*ray as usize) - low) * per_cell;
+            let [x, y, z] = at.to_array().map(|v| spread((v as u32).min(1023)));
+            *key = x | y << 1 | z << 2;
         }
-        for ray in 0..fill_rays {
-            let direction = fill_direction((ray * of + sample, fill_rays * of), quarter);
-            rays.gather(points, &group, |_| direction, lights.occlusion_radius);
-            trace(simd, &mut rays.packet, view.systems, counts);
-            rays.scatter(&group, &mut fills);
+        self.order.sort_unstable();
+        pixel
+    }
+
+    /// Where the group ends that begins at `from`: before its box grows longer than `most`, and before
+    /// it has too many points.
+    #[inline(always)]
+    fn group(&self, work: Work<'_>, (from, most): (usize, f32)) -> usize {
+        let points = GROUP_POINTS * work.rays.pattern.samples as usize;
+        let end = self.order.len().min(from + points);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (at, (_, ray)) in self.order[from..end].iter().enumerate() {
+            let position = work.hits.position_of(*ray as usize);
+            (low, high) = (low.min(position), high.max(position));
+            if (high - low).max_element() > most && at > 0 {
+                return from + at;
+            }
+        }
+        end
+    }
+
+    /// Shadow rays from the points of a group: one bundle towards the whole light.
+    #[inline(always)]
+    fn shadow<S: Simd>(
+        &mut self,
+        simd: S,
+        work: Work<'_>,
+        (from, to): (usize, usize),
+        counts: &mut Counts,
+    ) {
+        self.points.clear();
+        for (_, ray) in &self.order[from..to] {
+            self.points.push(work, *ray);
+        }
+        let Some(cone) = &work.aims.key_cone else { return };
+        let rays = work.aims.key_rays;
+        self.bundle.clear();
+        // Rays in vectors of sixteen, point by point.
+        let mut staged = Staged::new();
+        for point in 0..self.points.count {
+            let (origin, normal) = self.points.get(point);
+            let ray = self.points.ray[point] as usize;
+            let (x, y) = work.rays.pattern.pixel(ray);
+            let first = work.aims.key_set(
+                turn(work.corner.0 + x, work.corner.1 + y),
+                work.first_sample + work.rays.pattern.sample(ray),
+            );
+            for place in first..first + rays {
+                let direction = work.aims.key_direction(place);
+                let cosine = direction.dot(normal);
+                if cosine > 0.0 {
+                    staged.push(origin, direction, (cosine, point));
+                    if staged.count == LANES {
+                        staged.flush(simd, &mut self.bundle, f32::INFINITY);
+                    }
+                }
+            }
+        }
+        staged.flush(simd, &mut self.bundle, f32::INFINITY);
+        let bounds = self.points.bounds(0, self.points.count);
+        let systems = work.view.systems;
+        self.bundle.block(simd, (cone, bounds, f32::INFINITY), systems, counts);
+        for (_, ray) in &self.order[from..to] {
+            self.key.visible[*ray as usize] = 0.0;
+            self.key.all[*ray as usize] = 0.0;
+        }
+        for (i, (cosine, point)) in staged.own.iter().enumerate() {
+            let ray = self.points.ray[*point as usize] as usize;
+            self.key.all[ray] += cosine;
+            if self.bundle.is_open(i) {
+                self.key.visible[ray] += cosine;
+            }
         }
     }
-    let together = together(points);
-    if key_rays > 0 {
-        for (i, visible) in shared(&together, points, &keys).into_iter().enumerate() {
-            all[i].key = visible * keys[i].1 / key_rays as f32;
+
+    /// Occlusion rays from the points of a group: a bundle for each direction.
+    #[inline(always)]
+    fn occlude<S: Simd>(
+        &mut self,
+        simd: S,
+        work: Work<'_>,
+        (from, to): (usize, usize),
+        counts: &mut Counts,
+    ) {
+        let (pattern, aims) = (work.rays.pattern, work.aims);
+        // Of a pixel with sixteen samples nothing is shared with neighbours.
+        let quarters = if pattern.side == 1 { 1 } else { 4 };
+        let classes = quarters * pattern.samples;
+        let class_of = |ray: u32| {
+            let (x, y) = pattern.pixel(ray as usize);
+            let quarter = if quarters == 1 { 0 } else { x % 2 + y % 2 * 2 };
+            quarter * pattern.samples + pattern.sample(ray as usize)
+        };
+        for class in 0..classes {
+            self.points.clear();
+            for (_, ray) in self.order[from..to].iter().filter(|(_, ray)| class_of(*ray) == class) {
+                self.points.push(work, *ray);
+            }
+            if self.points.count == 0 {
+                continue;
+            }
+            let (quarter, sample) = (class / pattern.samples, class % pattern.samples);
+            let directions = aims.fill_set(quarter, work.first_sample + sample);
+            let bounds = self.points.bounds(0, self.points.count);
+            self.points.pad();
+            self.points.clear_sums();
+            for (direction, cone) in directions {
+                self.points.aim(simd, *direction, aims.reach, &mut self.bundle);
+                if self.bundle.vectors() > 0 {
+                    self.bundle.block(simd, (cone, bounds, aims.reach), work.view.systems, counts);
+                    self.points.gather(simd, *direction, &self.bundle);
+                }
+            }
+            for point in 0..self.points.count {
+                let ray = self.points.ray[point] as usize;
+                self.fill.visible[ray] = self.points.visible[point];
+                self.fill.all[ray] = self.points.all[point];
+            }
         }
     }
-    if fill_rays > 0 {
-        for (reaching, visible) in all.iter_mut().zip(shared(&together, points, &fills)) {
-            reaching.fill = visible;
-        }
-    }
-    all
 }
 
-/// The points in an order that puts those together whose light is alike: one sample of a square of two
-/// by two pixels, on the same sphere. It depends on nothing but the points.
-fn together(points: &[Point]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_unstable_by_key(|i| {
-        let p = &points[*i as usize];
-        (p.near(), p.quarter)
-    });
-    order
+/// Up to sixteen rays on their way into a bundle, and whose all that went before are.
+struct Staged {
+    count: usize,
+    origin: [[f32; LANES]; 3],
+    direction: [[f32; LANES]; 3],
+    /// Cosine and point of every ray of the bundle.
+    own: Vec<(f32, u32)>,
 }
 
-/// The visible part, from sums of all points together: neighbours look in directions between each
-/// other's, so that each point has those of four (interleaved sampling, Keller and Heidrich 2001).
-fn shared(together: &[u32], points: &[Point], sums: &[(f32, f32)]) -> Vec<f32> {
-    let mut visible = vec![1.0; points.len()];
-    for near in together.chunk_by(|a, b| points[*a as usize].near() == points[*b as usize].near()) {
-        let total = near.iter().map(|i| sums[*i as usize]);
-        let total = total.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        // No direction above the surface says nothing: open.
-        if total.1 > 0.0 {
-            near.iter().for_each(|i| visible[*i as usize] = total.0 / total.1);
+impl Staged {
+    fn new() -> Self {
+        Self {
+            count: 0,
+            origin: [[0.0; LANES]; 3],
+            direction: [[0.0; LANES]; 3],
+            own: Vec::new(),
         }
     }
-    visible
+
+    #[inline(always)]
+    fn push(&mut self, origin: Vec3, direction: Vec3, (cosine, point): (f32, usize)) {
+        for axis in 0..3 {
+            self.origin[axis][self.count] = origin[axis];
+            self.direction[axis][self.count] = direction[axis];
+        }
+        self.own.push((cosine, point as u32));
+        self.count += 1;
+    }
+
+    /// Puts what there is into the bundle, as one vector.
+    #[inline(always)]
+    fn flush<S: Simd>(&mut self, simd: S, bundle: &mut Bundle, reach: f32) {
+        if self.count == 0 {
+            return;
+        }
+        let mut reaches = [reach; LANES];
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for lane in 0..LANES {
+            if lane < self.count {
+                let [x, y, z] = &self.origin;
+                let origin = Vec3::new(x[lane], y[lane], z[lane]);
+                (low, high) = (low.min(origin), high.max(origin));
+            } else {
+                reaches[lane] = LOST;
+            }
+        }
+        let around = (0.5 * (low + high), 0.5 * (high - low).length() * (1.0 + 1e-5));
+        let [ox, oy, oz] = &self.origin;
+        let [dx, dy, dz] = &self.direction;
+        bundle.push(
+            [
+                f32x16::from_slice(simd, ox),
+                f32x16::from_slice(simd, oy),
+                f32x16::from_slice(simd, oz),
+            ],
+            [
+                f32x16::from_slice(simd, dx),
+                f32x16::from_slice(simd, dy),
+                f32x16::from_slice(simd, dz),
+            ],
+            f32x16::from_slice(simd, &reaches),
+            around,
+        );
+        self.count = 0;
+    }
 }
 
-/// Points of a packet of secondary rays.
-const PACKET_POINTS: usize = 64;
-/// Edge of the cells that points are sorted by, in pixels at their distance: as many points of one
-/// sample and quarter as a packet takes lie in one cell of a surface seen face on.
-const CELL_PIXELS: f32 = 16.0;
+/// The points of a group where secondary rays start, coordinate by coordinate.
+#[derive(Debug, Default)]
+struct Points {
+    count: usize,
+    origin: [Vec<f32>; 3],
+    normal: [Vec<f32>; 3],
+    /// Whose they are.
+    ray: Vec<u32>,
+    /// Sums over the rays of each point.
+    visible: Vec<f32>,
+    all: Vec<f32>,
+    /// Which vectors of points have a ray in the bundle at hand.
+    aimed: Vec<u32>,
+}
 
-/// The points in groups that belong to the same sample and quarter and lie together.
-fn groups(points: &[Point], rays: &motes_scene::Rays) -> Vec<Vec<u32>> {
-    let low = points.iter().map(|p| p.position).fold(Vec3::INFINITY, Vec3::min);
-    let depth = points.iter().map(|p| p.depth).fold(f32::INFINITY, f32::min);
-    let cell = match rays.projection {
-        motes_scene::Projection::Perspective => rays.pixel * depth,
-        motes_scene::Projection::Orthographic => rays.pixel,
-    } * CELL_PIXELS;
-    let key = |p: &Point| {
-        // 10 bits an axis; farther cells share the last.
-        let at = ((p.position - low) / cell).to_array().map(|v| (v as u32).min(1023));
-        u64::from(p.sample * 4 + p.quarter) << 32
-            | u64::from(spread(at[0]) | spread(at[1]) << 1 | spread(at[2]) << 2)
+impl Points {
+    fn clear(&mut self) {
+        self.count = 0;
+        self.ray.clear();
+        for axis in 0..3 {
+            self.origin[axis].clear();
+            self.normal[axis].clear();
+        }
+    }
+
+    /// Adds the hit of a ray, lifted off its surface so that its rays do not meet it by rounding.
+    #[inline(always)]
+    fn push(&mut self, work: Work<'_>, ray: u32) {
+        let at = ray as usize;
+        let (position, normal) = (work.hits.position_of(at), work.hits.normal_of(at));
+        // A thousandth of the radius, and what rounding of the coordinates may add to it.
+        let size = position.abs().max_element() + work.rays.distance[at];
+        let origin = position + normal * (1e-3 * work.hits.radius[at] + 1e-6 * size);
+        for axis in 0..3 {
+            self.origin[axis].push(origin[axis]);
+            self.normal[axis].push(normal[axis]);
+        }
+        self.ray.push(ray);
+        self.count += 1;
+    }
+
+    fn get(&self, point: usize) -> (Vec3, Vec3) {
+        let at = |v: &[Vec<f32>; 3]| Vec3::new(v[0][point], v[1][point], v[2][point]);
+        (at(&self.origin), at(&self.normal))
+    }
+
+    /// The box around the origins of points `from..to`.
+    fn bounds(&self, from: usize, to: usize) -> (Vec3, Vec3) {
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for axis in 0..3 {
+            for v in &self.origin[axis][from..to] {
+                low[axis] = low[axis].min(*v);
+                high[axis] = high[axis].max(*v);
+            }
+        }
+        (low, high)
+    }
+
+    /// Fills the last vector with points that face nowhere.
+    fn pad(&mut self) {
+        let lanes = self.count.next_multiple_of(LANES);
+        for axis in 0..3 {
+            self.origin[axis].resize(lanes, 0.0);
+            self.normal[axis].resize(lanes, 0.0);
+        }
+    }
+
+    fn clear_sums(&mut self) {
+        let lanes = self.count.next_multiple_of(LANES);
+        for sums in [&mut self.visible, &mut self.all] {
+            sums.clear();
+            sums.resize(lanes, 0.0);
+        }
+    }
+
+    /// Cosines of vector `first` of the points with a direction; what lies below is below zero.
+    #[inline(always)]
+    fn cosines<S: Simd>(&self, simd: S, direction: Vec3, first: usize) -> f32x16<S> {
+        let [nx, ny, nz] = &self.normal;
+        let nx = f32x16::from_slice(simd, &nx[first..first + LANES]);
+        let ny = f32x16::from_slice(simd, &ny[first..first + LANES]);
+        let nz = f32x16::from_slice(simd, &nz[first..first + LANES]);
+        nz * direction.z + ny * direction.y + nx * direction.x
+    }
+
+    /// Makes the bundle of the rays of all points along `direction`, where it lies above the surface.
+    #[inline(always)]
+    fn aim<S: Simd>(&mut self, simd: S, direction: Vec3, reach: f32, bundle: &mut Bundle) {
+        bundle.clear();
+        self.aimed.clear();
+        let zero = f32x16::splat(simd, 0.0);
+        let d = [
+            f32x16::splat(simd, direction.x),
+            f32x16::splat(simd, direction.y),
+            f32x16::splat(simd, direction.z),
+        ];
+        for first in (0..self.count).step_by(LANES) {
+            let above = self.cosines(simd, direction, first).simd_gt(zero);
+            if !above.any_true() {
+                continue;
+            }
+            let reach = above.select(f32x16::splat(simd, reach), f32x16::splat(simd, LOST));
+            let [x, y, z] = &self.origin;
+            let origin = [
+                f32x16::from_slice(simd, &x[first..first + LANES]),
+                f32x16::from_slice(simd, &y[first..first + LANES]),
+                f32x16::from_slice(simd, &z[first..first + LANES]),
+            ];
+            bundle.push(origin, d, reach, (Vec3::ZERO, f32::INFINITY));
+            self.aimed.push(first as u32);
+        }
+    }
+
+    /// Adds what the rays of the bundle along `direction` saw to the sums.
+    #[inline(always)]
+    fn gather<S: Simd>(&mut self, simd: S, direction: Vec3, bundle: &Bundle) {
+        let zero = f32x16::splat(simd, 0.0);
+        for vector in 0..self.aimed.len() {
+            let first = self.aimed[vector] as usize;
+            let lanes = first..first + LANES;
+            let cosine = self.cosines(simd, direction, first).max(zero);
+            let visible = bundle.open(simd, vector).select(cosine, zero);
+            let sum = f32x16::from_slice(simd, &self.visible[lanes.clone()]) + visible;
+            sum.store_slice(&mut self.visible[lanes.clone()]);
+            let sum = f32x16::from_slice(simd, &self.all[lanes.clone()]) + cosine;
+            sum.store_slice(&mut self.all[lanes]);
+        }
+    }
+}
+
+/// Turns sums into visible parts, which the hits of a square of two by two pixels (of a pixel, if it
+/// fills a block) on the same sphere share. `times` what is there already, or instead of it.
+fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
+    let (hits, rays) = (work.hits, work.rays);
+    let squares: &[u16] = match rays.pattern.side {
+        4 => &[0x0033, 0x00cc, 0x3300, 0xcc00],
+        _ => &[0xffff],
     };
-    let mut order: Vec<(u64, u32)> =
-        points.iter().enumerate().map(|(i, p)| (key(p), i as u32)).collect();
-    order.sort_unstable();
-    let mut groups: Vec<Vec<u32>> = Vec::new();
-    let mut before = u64::MAX;
-    for (key, i) in order {
-        // Neighbours within a block of 2³ cells may share a packet.
-        match groups.last_mut() {
-            Some(group) if key >> 3 == before && group.len() < PACKET_POINTS => group.push(i),
-            _ => groups.push(vec![i]),
+    for block in (0..TILE_RAYS / LANES).filter(|block| hits.mask[*block] != 0) {
+        for square in squares {
+            let mut left = hits.mask[block] & square;
+            while left != 0 {
+                let sphere = |lane: usize| {
+                    (hits.index[block * LANES + lane], rays.hit_system[block * LANES + lane])
+                };
+                let first = sphere(left.trailing_zeros() as usize);
+                let (mut same, mut visible, mut all) = (0u16, 0.0, 0.0);
+                for lane in (0..LANES).filter(|lane| left >> lane & 1 == 1) {
+                    if sphere(lane) == first {
+                        same |= 1 << lane;
+                        visible += sums.visible[block * LANES + lane];
+                        all += sums.all[block * LANES + lane];
+                    }
+                }
+                left &= !same;
+                // No direction above the surface says nothing: open.
+                let part = if all > 0.0 { visible / all } else { 1.0 };
+                for lane in (0..LANES).filter(|lane| same >> lane & 1 == 1) {
+                    let reaching = &mut reaching[block * LANES + lane];
+                    *reaching = if times { *reaching * part } else { part };
+                }
+            }
         }
-        before = key >> 3;
     }
-    groups
+}
+
+/// Which turn of the light's samples a pixel has: neighbours lie far apart (Roberts' R₂ sequence).
+fn turn(x: u32, y: u32) -> u32 {
+    let at = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5));
+    at >> (32 - TURNS.ilog2())
 }
 
 /// The ten bits of `v`, two zeros between each.
@@ -181,57 +522,6 @@ fn spread(v: u32) -> u32 {
     (v | v << 2) & 0x0924_9249
 }
 
-/// A packet of secondary rays, and whose they are.
-struct Rays {
-    packet: Box<Packet>,
-    owner: [u16; PACKET_POINTS],
-    cosine: [f32; PACKET_POINTS],
-}
-
-impl Rays {
-    fn new() -> Self {
-        let packet = Box::new(Packet::new());
-        Self { packet, owner: [0; PACKET_POINTS], cosine: [0.0; PACKET_POINTS] }
-    }
-
-    /// Starts a ray at every point of the group whose direction lies above its surface.
-    fn gather(
-        &mut self,
-        points: &[Point],
-        group: &[u32],
-        aim: impl Fn(&Point) -> Vec3,
-        reach: f32,
-    ) {
-        self.packet.clear_for_any_hit();
-        for (owner, point) in group.iter().map(|i| &points[*i as usize]).enumerate() {
-            let direction = aim(point);
-            let cosine = direction.dot(point.normal);
-            if cosine > 0.0 {
-                let ray = self.packet.len();
-                self.owner[ray] = owner as u16;
-                self.cosine[ray] = cosine;
-                let origin = point.position + point.normal * point.lift;
-                self.packet.push_within(origin, direction, reach);
-            }
-        }
-    }
-
-    /// Adds (visible · cosine, cosine) to the sums of the rays' points.
-    fn scatter(&self, group: &[u32], sums: &mut [(f32, f32)]) {
-        for ray in 0..self.packet.len() {
-            let cosine = self.cosine[ray];
-            let sum = &mut sums[group[self.owner[ray] as usize] as usize];
-            sum.0 += if self.packet.is_blocked(ray) { 0.0 } else { cosine };
-            sum.1 += cosine;
-        }
-    }
-}
-
-/// The key light on a point in the open.
-fn open_key(key: &KeyLight, point: &Point) -> f32 {
-    let sin_half_angle = (1.0 - key.cos_half_angle * key.cos_half_angle).max(0.0).sqrt();
-    lit(point.normal.dot(key.direction), sin_half_angle)
-}
 
 /// The part of a round light's strength that falls on a surface at cosine `cosine` from its middle.
 ///
@@ -247,60 +537,6 @@ fn lit(cosine: f32, sin_half_angle: f32) -> f32 {
     }
 }
 
-/// A cap of directions around an axis.
-#[derive(Clone, Copy)]
-struct Cap {
-    axis: Vec3,
-    across: (Vec3, Vec3),
-    /// One minus the cosine of the half angle at the rim.
-    depth: f32,
-}
-
-impl Cap {
-    fn new(axis: Vec3, cos_half_angle: f32) -> Self {
-        Self { axis, across: axis.any_orthonormal_pair(), depth: 1.0 - cos_half_angle }
-    }
-
-    /// The direction that `area` (0..1, from the middle to the rim) and `turn` (in turns) lead to.
-    fn direction(&self, area: f32, turn: f32) -> Vec3 {
-        let cosine = 1.0 - area * self.depth;
-        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        let (sin, cos) = (turn.fract() * std::f32::consts::TAU).sin_cos();
-        self.axis * cosine + (self.across.0 * cos + self.across.1 * sin) * sine
-    }
-}
-
-/// The golden angle, in turns.
-const GOLDEN_TURN: f32 = 0.381_966;
-
-/// The direction to part `place` of `places` of a round light: parts of equal area along a Fibonacci
-/// spiral, which each pixel turns its own way.
-fn key_direction(light: &Cap, point: &Point, (place, places): (u32, u32)) -> Vec3 {
-    let area = (place as f32 + unit(hash(point.seed ^ place))) / places as f32;
-    light.direction(area, place as f32 * GOLDEN_TURN + unit(hash(point.seed)))
-}
-
-/// Direction `place` of `places` over the sphere, for pixels of one quarter: the middles of parts of
-/// equal area along a Fibonacci spiral. The directions of the four quarters lie between each other.
-fn fill_direction((place, places): (u32, u32), quarter: u32) -> Vec3 {
-    let between = (quarter as f32 + 0.5) / 4.0;
-    let area = (place as f32 + between) / places as f32;
-    Cap::new(Vec3::Z, -1.0).direction(area, (place as f32 + between) * GOLDEN_TURN)
-}
-
-/// A hash whose every bit depends on every bit of `x` (C. Wellons, "lowbias32").
-pub(crate) fn hash(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
-
-/// A number in 0..1 from the upper bits of a hash.
-fn unit(hash: u32) -> f32 {
-    (hash >> 8) as f32 / (1 << 24) as f32
-}
 
 #[cfg(test)]
 mod tests {
@@ -315,45 +551,5 @@ mod tests {
         assert!((lit(0.0, s) - 0.05).abs() < 1e-7);
         assert_eq!(lit(0.3, 0.0), 0.3);
         assert_eq!(lit(-0.3, 0.0), 0.0);
-    }
-
-    fn point(sample: u32, seed: u32) -> Point {
-        Point {
-            position: Vec3::ZERO,
-            normal: Vec3::Z,
-            depth: 1.0,
-            lift: 0.0,
-            sample,
-            of: 4,
-            quarter: 0,
-            square: (0, 0),
-            sphere: (0, 0),
-            seed,
-        }
-    }
-
-    #[test]
-    fn fill_directions_cover_the_sphere_evenly() {
-        // The mean of max(0, n·d) over the sphere is 1/4, of d itself zero.
-        let all: Vec<Vec3> = (0..4)
-            .flat_map(|quarter| (0..64).map(move |place| fill_direction((place, 64), quarter)))
-            .collect();
-        let mean = all.iter().sum::<Vec3>() / 256.0;
-        assert!(mean.length() < 0.02, "{mean}");
-        for normal in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE.normalize()] {
-            let cosine = all.iter().map(|d| d.dot(normal).max(0.0)).sum::<f32>() / 256.0;
-            assert!((cosine - 0.25).abs() < 0.02, "{normal}: {cosine}");
-        }
-        assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-5));
-    }
-
-    #[test]
-    fn key_directions_stay_within_the_light_and_fill_it() {
-        let light = Cap::new(Vec3::new(0.6, 0.0, 0.8), 0.9);
-        let all: Vec<Vec3> =
-            (0..64).map(|place| key_direction(&light, &point(place % 4, 9), (place, 64))).collect();
-        assert!(all.iter().all(|d| d.dot(light.axis) > 0.9 - 1e-5));
-        let mean = all.iter().map(|d| d.dot(light.axis)).sum::<f32>() / 64.0;
-        assert!((mean - 0.95).abs() < 0.005, "{mean}");
     }
 }

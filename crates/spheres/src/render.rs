@@ -1,15 +1,31 @@
-//! A whole picture: tiles on all cores, packets within tiles.
+//! A whole picture: areas on all cores, tiles of rays within areas.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
 use fearless_simd_macros::simd;
-use glam::Vec3;
 use motes_scene::{Lights, Rays};
-use rayon::prelude::*;
 
-use crate::occlude::{Point, hash, reaching};
+use crate::hits::Hits;
+use crate::aims::Aims;
+use crate::occlude::{Occluder, Work};
+use crate::overview::{GroupView, overview};
 use crate::packet::{MOST_RAYS, Packet};
-use crate::shade::{Paint, shade};
+use crate::project::project;
+use crate::shade::{Canvas, Paint, shade};
+use crate::tile::{Pattern, Place, RayTile};
 use crate::traverse::{Counts, Spheres, trace};
+
+/// How the first hits are found. Changes the speed, never the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Primary {
+    /// Blocks of the grid front to back onto tiles.
+    #[default]
+    Project,
+    /// Packets through the grid: the paper's method.
+    Trace,
+}
 
 /// What to make of the rays.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +34,8 @@ pub struct Settings {
     pub size: (u32, u32),
     /// Rays per pixel for the colour.
     pub samples: u32,
+    /// How the first hits are found.
+    pub primary: Primary,
     /// Side of a packet, rays: 2, 4, 8 or 16.
     pub packet: u32,
     /// Whether depth, normal, id and system are wanted.
@@ -39,17 +57,6 @@ pub struct View<'a> {
     pub lights: &'a Lights,
 }
 
-/// A picture, row by row from the top.
-#[derive(Clone, Debug, Default)]
-pub struct Picture {
-    /// Linear, premultiplied RGBA.
-    pub color: Vec<[f32; 4]>,
-    /// What the ray through each pixel's centre hit; empty if layers were not wanted.
-    pub center: Vec<Center>,
-    /// Counts of work.
-    pub counts: Counts,
-}
-
 /// What the ray through a pixel's centre hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Center {
@@ -64,193 +71,333 @@ pub struct Center {
 }
 
 impl Center {
-    const NOTHING: Self = Self { depth: f32::INFINITY, normal: [0.0; 3], id: -1, system: 0 };
+    pub(crate) const NOTHING: Self =
+        Self { depth: f32::INFINITY, normal: [0.0; 3], id: -1, system: 0 };
 }
 
-/// Pixels along a tile's side.
-const TILE: u32 = 64;
+/// A finished part of the picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Tile<'a> {
+    /// Its first pixel.
+    pub corner: (u32, u32),
+    /// Its width and height, pixels.
+    pub size: (u32, u32),
+    /// Linear, premultiplied RGBA, row by row.
+    pub color: &'a [[f32; 4]],
+    /// What the rays through the pixels' centres hit; empty if layers were not wanted.
+    pub center: &'a [Center],
+}
 
-/// Renders the picture. `progress` is told of tiles done and tiles in all, from any thread; where it
-/// gives `false` the rest is left out and there is no picture.
-pub fn render(
-    view: View<'_>,
-    settings: Settings,
-    progress: &(dyn Fn(u64, u64) -> bool + Sync),
-) -> Option<Picture> {
-    let (width, height) = settings.size;
-    let (across, down) = (width.div_ceil(TILE), height.div_ceil(TILE));
-    let total = u64::from(across) * u64::from(down);
-    let done = std::sync::atomic::AtomicU64::new(0);
-    let tiles: Vec<(Area, Tile)> = (0..across * down)
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|i| {
-            let (x, y) = (i % across * TILE, i / across * TILE);
-            let area = Area { x, y, w: TILE.min(width - x), h: TILE.min(height - y) };
-            let tile = dispatch!(settings.level, simd => render_tile(simd, view, settings, area));
-            let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress(done, total).then_some((area, tile))
-        })
-        .collect::<Option<_>>()?;
+/// Takes the parts of a picture as they are finished, in any order and on any thread.
+pub trait Sink: Sync {
+    /// Takes a tile. Where it gives `false` the rest of the picture is left out.
+    fn tile(&self, tile: &Tile<'_>) -> bool;
+}
 
-    let pixels = width as usize * height as usize;
-    let mut picture = Picture { color: vec![[0.0; 4]; pixels], ..Picture::default() };
-    if settings.layers {
-        picture.center = vec![Center::NOTHING; pixels];
+/// Pixels along the side of an area: what one thread does at a time.
+pub(crate) const AREA: u32 = 64;
+
+/// Renders pictures, and keeps its buffers from one to the next.
+#[derive(Debug, Default)]
+pub struct Renderer {
+    desks: Mutex<Vec<Desk>>,
+}
+
+impl Renderer {
+    /// A renderer without buffers.
+    pub fn new() -> Self {
+        Self::default()
     }
-    for (area, tile) in tiles {
-        picture.counts.add(tile.counts);
-        for row in 0..area.h as usize {
-            let from = row * area.w as usize..(row + 1) * area.w as usize;
-            let to = (area.y as usize + row) * width as usize + area.x as usize;
-            let to = to..to + area.w as usize;
-            picture.color[to.clone()].copy_from_slice(&tile.color[from.clone()]);
-            if settings.layers {
-                picture.center[to].copy_from_slice(&tile.center[from]);
+
+    /// How many tiles a picture of `size` comes in.
+    pub fn tiles((width, height): (u32, u32)) -> usize {
+        width.div_ceil(AREA) as usize * height.div_ceil(AREA) as usize
+    }
+
+    /// Renders a picture, tile by tile into `sink`, on the threads of the current pool. Gives counts of
+    /// work, or `None` if the sink stopped it.
+    pub fn render(&self, view: View<'_>, settings: Settings, sink: &dyn Sink) -> Option<Counts> {
+        let plan = Plan::new(view, settings);
+        let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let total = Mutex::new(Counts::default());
+        let areas = Self::tiles(settings.size);
+        rayon::scope(|scope| {
+            for _ in 0..rayon::current_num_threads().min(areas) {
+                scope.spawn(|_| {
+                    let mut desk = self.take();
+                    let mut counts = Counts::default();
+                    let mut area = next.fetch_add(1, Ordering::Relaxed);
+                    while area < areas && !stopped.load(Ordering::Relaxed) {
+                        dispatch!(settings.level, simd => plan.area(simd, area, &mut desk, &mut counts));
+                        if !sink.tile(&desk.tile(plan.place(area), settings.layers)) {
+                            stopped.store(true, Ordering::Relaxed);
+                        }
+                        area = next.fetch_add(1, Ordering::Relaxed);
+                    }
+                    self.put_back(desk);
+                    if let Ok(mut total) = total.lock() {
+                        total.add(counts);
+                    }
+                });
+            }
+        });
+        let total = total.into_inner().unwrap_or_default();
+        (!stopped.into_inner()).then_some(total)
+    }
+
+    fn take(&self) -> Desk {
+        let kept = self.desks.lock().ok().and_then(|mut desks| desks.pop());
+        kept.unwrap_or_else(Desk::new)
+    }
+
+    fn put_back(&self, desk: Desk) {
+        if let Ok(mut desks) = self.desks.lock() {
+            desks.push(desk);
+        }
+    }
+}
+
+/// What one thread works with.
+#[derive(Debug)]
+struct Desk {
+    rays: RayTile,
+    packet: Box<Packet>,
+    hits: Hits,
+    occluder: Occluder,
+    color: Vec<[f32; 4]>,
+    center: Vec<Center>,
+}
+
+impl Desk {
+    fn new() -> Self {
+        Self {
+            rays: RayTile::new(),
+            packet: Box::new(Packet::new()),
+            hits: Hits::new(),
+            occluder: Occluder::new(),
+            color: Vec::new(),
+            center: Vec::new(),
+        }
+    }
+
+    fn tile(&self, place: Place, layers: bool) -> Tile<'_> {
+        let center = if layers { &self.center[..] } else { &[] };
+        Tile { corner: place.corner, size: place.size, color: &self.color, center }
+    }
+}
+
+/// One picture: what is the same for all of its areas.
+struct Plan<'a> {
+    view: View<'a>,
+    settings: Settings,
+    /// Where the samples of a pixel lie, in rounds of 16, 4 or 1.
+    rounds: Vec<Pattern>,
+    /// Per system, the groups of blocks that may be seen; and per area, which of them may show in it,
+    /// nearest first.
+    groups: Vec<Vec<GroupView>>,
+    shown: Vec<Vec<Vec<u32>>>,
+    aims: Aims,
+}
+
+impl<'a> Plan<'a> {
+    fn new(view: View<'a>, settings: Settings) -> Self {
+        let offsets = sample_offsets(settings.samples);
+        let mut rounds = Vec::new();
+        let mut left = &offsets[..];
+        while !left.is_empty() {
+            let pattern = Pattern::of(left);
+            rounds.push(pattern);
+            left = &left[pattern.samples as usize..];
+        }
+        let mut plan = Self { view, settings, rounds, groups: Vec::new(), shown: Vec::new(), aims: Aims::new(view.lights, settings.samples) };
+        if settings.primary == Primary::Project {
+            for spheres in view.systems {
+                let groups =
+                    dispatch!(settings.level, simd => overview(simd, view.rays, spheres));
+                plan.shown.push(plan.shown_in(&groups));
+                plan.groups.push(groups);
+            }
+        }
+        plan
+    }
+
+    /// Which groups may show in each area, nearest first.
+    fn shown_in(&self, groups: &[GroupView]) -> Vec<Vec<u32>> {
+        let (width, height) = self.settings.size;
+        let (across, down) = (width.div_ceil(AREA), height.div_ceil(AREA));
+        let mut shown = vec![Vec::new(); (across * down) as usize];
+        let mut order: Vec<u32> = (0..groups.len() as u32).collect();
+        let near = |g: &u32| groups[*g as usize].whole.near;
+        order.sort_unstable_by(|a, b| near(a).total_cmp(&near(b)).then(a.cmp(b)));
+        for group in order {
+            let whole = groups[group as usize].whole;
+            let areas = |(low, high): (f32, f32), count: u32| {
+                // `as` truncates and saturates: below zero is zero.
+                let last = (high / AREA as f32) as u32;
+                (low / AREA as f32) as u32..if high < 0.0 { 0 } else { last.min(count - 1) + 1 }
+            };
+            for y in areas(whole.y, down) {
+                for x in areas(whole.x, across) {
+                    shown[(y * across + x) as usize].push(group);
+                }
+            }
+        }
+        shown
+    }
+
+    fn place(&self, area: usize) -> Place {
+        let (width, height) = self.settings.size;
+        let across = width.div_ceil(AREA) as usize;
+        let corner = ((area % across) as u32 * AREA, (area / across) as u32 * AREA);
+        Place { corner, size: (AREA.min(width - corner.0), AREA.min(height - corner.1)) }
+    }
+
+    /// Renders one area onto the desk.
+    #[simd]
+    fn area<S: Simd>(&self, simd: S, area: usize, desk: &mut Desk, counts: &mut Counts) {
+        let place = self.place(area);
+        let pixels = (place.size.0 * place.size.1) as usize;
+        desk.color.clear();
+        desk.color.resize(pixels, [0.0; 4]);
+        desk.center.clear();
+        if self.settings.layers {
+            desk.center.resize(pixels, Center::NOTHING);
+        }
+        let projected = self.settings.primary == Primary::Project;
+        if projected && self.shown.iter().all(|shown| shown[area].is_empty()) {
+            return;
+        }
+        let mut first_sample = 0;
+        for pattern in &self.rounds {
+            for part in parts(place, pattern.tile_side()) {
+                self.first_hits(simd, (area, part, *pattern), desk, counts);
+                if desk.hits.gather(simd, &desk.rays, self.view.systems) > 0 {
+                    self.light(simd, (place, part, first_sample), desk, counts);
+                }
+            }
+            first_sample += pattern.samples;
+        }
+        if self.settings.layers {
+            let middle = Pattern::of(&[[0.5; 2]]);
+            self.first_hits(simd, (area, place, middle), desk, counts);
+            desk.hits.gather(simd, &desk.rays, self.view.systems);
+            for y in 0..place.size.1 {
+                for x in 0..place.size.0 {
+                    let ray = middle.ray((x, y), 0);
+                    let at = (y * place.size.0 + x) as usize;
+                    desk.center[at] = desk.hits.center(&desk.rays, ray);
+                }
             }
         }
     }
-    Some(picture)
-}
 
-/// A rectangle of pixels.
-#[derive(Clone, Copy, Debug)]
-struct Area {
-    x: u32,
-    y: u32,
-    w: u32,
-    h: u32,
-}
-
-impl Area {
-    /// The rectangles of at most `side` pixels that it consists of.
-    fn parts(self, side: u32) -> impl Iterator<Item = Area> {
-        (0..self.h).step_by(side as usize).flat_map(move |y| {
-            (0..self.w).step_by(side as usize).map(move |x| Area {
-                x: self.x + x,
-                y: self.y + y,
-                w: side.min(self.w - x),
-                h: side.min(self.h - y),
-            })
-        })
-    }
-
-    /// Its pixels, row by row.
-    fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
-        (0..self.h).flat_map(move |y| (0..self.w).map(move |x| (self.x + x, self.y + y)))
-    }
-}
-
-struct Tile {
-    color: Vec<[f32; 4]>,
-    center: Vec<Center>,
-    counts: Counts,
-}
-
-#[simd]
-fn render_tile<S: Simd>(simd: S, view: View<'_>, settings: Settings, area: Area) -> Tile {
-    let pixels = (area.w * area.h) as usize;
-    let mut tile =
-        Tile { color: vec![[0.0; 4]; pixels], center: Vec::new(), counts: Counts::default() };
-    let place = |(x, y): (u32, u32)| ((y - area.y) * area.w + x - area.x) as usize;
-    let mut packet = Packet::new();
-
-    // A packet takes a square of pixels with all their samples, or, of a pixel with more samples than
-    // it holds, as many as it holds.
-    let offsets = sample_offsets(settings.samples);
-    let side = (settings.packet / (settings.samples as f32).sqrt().ceil() as u32).max(1);
-    let weight = 1.0 / settings.samples as f32;
-    let mut hits: Vec<(usize, Surface)> = Vec::new();
-    let mut points = Vec::new();
-    for part in area.parts(side) {
-        for (chunk, some) in offsets.chunks(MOST_RAYS / (side * side) as usize).enumerate() {
-            packet.clear();
-            for (x, y) in part.pixels() {
-                for [dx, dy] in some {
-                    let (origin, direction) = view.rays.ray(x as f32 + dx, y as f32 + dy);
-                    packet.push(origin, direction);
-                }
+    /// Finds what the rays of a part of an area hit first.
+    #[simd]
+    fn first_hits<S: Simd>(
+        &self,
+        simd: S,
+        (area, part, pattern): (usize, Place, Pattern),
+        desk: &mut Desk,
+        counts: &mut Counts,
+    ) {
+        let Self { view, settings, .. } = self;
+        let rays = &mut desk.rays;
+        rays.aim(simd, view.rays, (part, pattern), None);
+        match settings.primary {
+            Primary::Trace => {
+                trace_tile(simd, (rays, &mut desk.packet), (view.systems, settings.packet), counts);
             }
-            trace(simd, &mut packet, view.systems, &mut tile.counts);
-            for (i, pixel) in part.pixels().enumerate() {
-                for j in 0..some.len() {
-                    let ray = i * some.len() + j;
-                    if let Some(surface) = Surface::of(&packet, ray, view.systems) {
-                        let sample = (chunk * MOST_RAYS + j) as u32;
-                        points.push(surface.point(pixel, (sample, settings.samples)));
-                        hits.push((place(pixel), surface));
+            Primary::Project => {
+                for (system, spheres) in view.systems.iter().enumerate() {
+                    let shown = (&self.groups[system][..], &self.shown[system][area][..]);
+                    if !shown.1.is_empty() {
+                        rays.begin_system();
+                        project(simd, (rays, part), spheres, shown, (view.rays, counts));
+                        rays.end_system(system as u16);
                     }
                 }
             }
         }
     }
-    let reaching = reaching(simd, &points, view, &mut tile.counts);
-    for ((place, surface), reaching) in hits.iter().zip(reaching) {
-        let albedo = view.paint.color(surface.system, surface.index);
-        let light = shade(view.lights, albedo, surface.normal, reaching) * weight;
-        let sum = &mut tile.color[*place];
-        for (sum, light) in sum.iter_mut().zip([light.x, light.y, light.z, weight]) {
-            *sum += light;
-        }
-    }
 
-    if settings.layers {
-        tile.center = vec![Center::NOTHING; pixels];
-        for part in area.parts(settings.packet) {
+    /// Adds the light of the hits of a part to the colours of its area.
+    #[simd]
+    fn light<S: Simd>(
+        &self,
+        simd: S,
+        (place, part, first_sample): (Place, Place, u32),
+        desk: &mut Desk,
+        counts: &mut Counts,
+    ) {
+        let Desk { rays, hits, occluder, color, .. } = desk;
+        let weight = 1.0 / self.settings.samples as f32;
+        let work = Work {
+            rays,
+            hits,
+            view: self.view,
+            aims: &self.aims,
+            corner: part.corner,
+            first_sample,
+        };
+        occluder.reach(simd, work, counts);
+        let canvas = Canvas {
+            color,
+            width: place.size.0,
+            at: (part.corner.0 - place.corner.0, part.corner.1 - place.corner.1),
+            weight,
+        };
+        shade(simd, (rays, hits, &occluder.reaching), self.view, canvas);
+    }
+}
+
+/// The parts of at most `side` pixels that an area consists of.
+fn parts(place: Place, side: u32) -> impl Iterator<Item = Place> {
+    let ((x, y), (w, h)) = (place.corner, place.size);
+    (0..h).step_by(side as usize).flat_map(move |dy| {
+        (0..w).step_by(side as usize).map(move |dx| Place {
+            corner: (x + dx, y + dy),
+            size: (side.min(w - dx), side.min(h - dy)),
+        })
+    })
+}
+
+/// Traces the rays of a tile in packets of `side`² (Gribble et al. 2007, §4).
+#[simd]
+fn trace_tile<S: Simd>(
+    simd: S,
+    (rays, packet): (&mut RayTile, &mut Packet),
+    (systems, side): (&[Spheres<'_>], u32),
+    counts: &mut Counts,
+) {
+    let samples = rays.pattern.samples;
+    // A packet takes a square of pixels with all their samples.
+    let side = (side / rays.pattern.samples_along()).max(1);
+    debug_assert!((side * side * samples) as usize <= MOST_RAYS);
+    let mut own = [0usize; MOST_RAYS];
+    for y in (0..rays.pattern.tile_side()).step_by(side as usize) {
+        for x in (0..rays.pattern.tile_side()).step_by(side as usize) {
             packet.clear();
-            for (x, y) in part.pixels() {
-                let (origin, direction) = view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
-                packet.push(origin, direction);
+            for i in 0..side * side {
+                for sample in 0..samples {
+                    let ray = rays.pattern.ray((x + i % side, y + i / side), sample);
+                    if rays.distance[ray] > 0.0 {
+                        own[packet.len()] = ray;
+                        packet.push(rays.origin_of(ray), rays.direction_of(ray));
+                    }
+                }
             }
-            trace(simd, &mut packet, view.systems, &mut tile.counts);
-            for (i, pixel) in part.pixels().enumerate() {
-                if let Some(hit) = Surface::of(&packet, i, view.systems) {
-                    tile.center[place(pixel)] = Center {
-                        depth: hit.distance,
-                        normal: hit.normal.to_array(),
-                        id: i64::from(hit.index),
-                        system: hit.system,
-                    };
+            if packet.is_empty() {
+                continue;
+            }
+            trace(simd, packet, systems, counts);
+            for (i, ray) in own[..packet.len()].iter().enumerate() {
+                if let Some((distance, system, slot)) = packet.hit(i) {
+                    rays.distance[*ray] = distance;
+                    rays.hit_system[*ray] = system;
+                    rays.hit_slot[*ray] = slot;
                 }
             }
         }
-    }
-    tile
-}
-
-/// The surface a ray has hit.
-struct Surface {
-    distance: f32,
-    position: Vec3,
-    radius: f32,
-    /// Unit normal, towards where the ray came from.
-    normal: Vec3,
-    index: u32,
-    system: u16,
-}
-
-impl Surface {
-    fn of(packet: &Packet, ray: usize, systems: &[Spheres<'_>]) -> Option<Self> {
-        let (distance, system, slot) = packet.hit(ray)?;
-        let (grid, place) = systems[system as usize].locate(slot);
-        let direction = packet.direction_of(ray);
-        let position = packet.origin_of(ray) + direction * distance;
-        let (outward, radius) = (position - grid.center(place), grid.radius_at(place));
-        // Rounding cannot flip it: a grazing ray's normal is at a right angle to the ray at most.
-        let inside = (grid.center(place) - packet.origin_of(ray)).length() < radius;
-        let normal = outward.normalize_or(-direction) * if inside { -1.0 } else { 1.0 };
-        Some(Self { distance, position, radius, normal, index: grid.index(place), system })
-    }
-
-    /// The point where secondary rays start.
-    fn point(&self, (x, y): (u32, u32), (sample, of): (u32, u32)) -> Point {
-        // A thousandth of the radius, and what rounding of the coordinates may add to it.
-        let lift = 1e-3 * self.radius + 1e-6 * (self.position.abs().max_element() + self.distance);
-        let seed = hash(x ^ hash(y));
-        let (position, normal, depth) = (self.position, self.normal, self.distance);
-        let quarter = x % 2 + y % 2 * 2;
-        let (square, sphere) = ((x / 2, y / 2), (self.system, self.index));
-        Point { position, normal, depth, lift, sample, of, quarter, square, sphere, seed }
     }
 }
 
@@ -288,11 +435,16 @@ mod tests {
 
     #[test]
     fn parts_cover_an_area_once() {
-        let area = Area { x: 3, y: 5, w: 13, h: 7 };
-        let mut pixels: Vec<_> = area.parts(4).flat_map(Area::pixels).collect();
-        pixels.sort_unstable();
-        let mut expected: Vec<_> = area.pixels().collect();
-        expected.sort_unstable();
-        assert_eq!(pixels, expected);
+        let area = Place { corner: (3, 5), size: (13, 7) };
+        let mut seen = [false; 13 * 7];
+        for part in parts(area, 4) {
+            for y in part.corner.1..part.corner.1 + part.size.1 {
+                for x in part.corner.0..part.corner.0 + part.size.0 {
+                    let at = ((y - 5) * 13 + x - 3) as usize;
+                    assert!(!std::mem::replace(&mut seen[at], true));
+                }
+            }
+        }
+        assert!(seen.iter().all(|s| *s));
     }
 }

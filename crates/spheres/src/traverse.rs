@@ -10,7 +10,7 @@ use fearless_simd_macros::simd;
 use motes_grid::{Block, Grid, RadiusClasses, Seen, Visibility};
 
 use crate::frustum::{Bounds, Frustum};
-use crate::intersect::{Cull, Sphere, cull, farthest, intersect};
+use crate::intersect::{Cull, Sphere, bits, cull, farthest, intersect};
 use crate::packet::{LANES, Packet};
 
 /// One particle system as the tracer sees it: its grids, and what is visible of each.
@@ -291,7 +291,7 @@ impl<S: Simd> Walk<'_, S> {
 /// Whole numbers from `low` to `high`, both in units of cells, within 0..`cells`; `None` if there are
 /// none.
 #[inline(always)]
-fn clip(low: f32, high: f32, cells: u32) -> Option<(u32, u32)> {
+pub(crate) fn clip(low: f32, high: f32, cells: u32) -> Option<(u32, u32)> {
     // A particle on the far face may lie a rounding outside.
     if high < 0.0 || low > cells as f32 * (1.0 + 1e-5) {
         return None;
@@ -301,7 +301,7 @@ fn clip(low: f32, high: f32, cells: u32) -> Option<(u32, u32)> {
 }
 
 /// The slices from `start` to `end` (in units of slices, in either direction) within 0..`slices`.
-struct Steps {
+pub(crate) struct Steps {
     next: i64,
     step: i64,
     left: i64,
@@ -309,7 +309,7 @@ struct Steps {
 
 impl Steps {
     #[inline(always)]
-    fn new(start: f32, end: f32, slices: u32) -> Self {
+    pub fn new(start: f32, end: f32, slices: u32) -> Self {
         let last = i64::from(slices) - 1;
         // Rounding may put either end one slice aside; one more slice on each costs little.
         let forward = end >= start;
@@ -337,16 +337,5 @@ impl Iterator for Steps {
         self.next += self.step;
         self.left -= 1;
         Some(slice)
-    }
-}
-
-/// Sixteen bits of `words` from bit `at` on.
-#[inline(always)]
-fn bits(words: &[u64], at: usize) -> u64 {
-    let (word, shift) = (at / 64, at % 64);
-    let low = words[word] >> shift;
-    match words.get(word + 1) {
-        Some(next) if shift > 0 => low | next << (64 - shift),
-        _ => low,
     }
 }

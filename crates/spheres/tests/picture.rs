@@ -4,7 +4,7 @@ use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, Radii, RadiusClasses, Visibility};
 use motes_scene::{Lights, Projection, Rays, Scene};
-use motes_spheres::{Paint, Picture, Settings, Spheres, View, render};
+use motes_spheres::{Paint, Picture, Primary, Settings, Spheres, View, render};
 
 const SIZE: (u32, u32) = (96, 80);
 
@@ -41,7 +41,14 @@ fn lights(change: impl FnOnce(&mut Lights)) -> Lights {
 }
 
 fn settings(samples: u32) -> Settings {
-    Settings { size: SIZE, samples, packet: 8, layers: true, level: Level::new() }
+    Settings {
+        size: SIZE,
+        samples,
+        primary: Primary::Project,
+        packet: 8,
+        layers: true,
+        level: Level::new(),
+    }
 }
 
 fn picture(
@@ -81,8 +88,9 @@ fn packets_threads_and_tiles_do_not_change_a_picture() {
         for samples in [1, 3, 4, 300] {
             let small = Settings { size: (40, 24), ..settings(samples) };
             let first = picture(&spheres, &lights, &rays, small);
-            for packet in [2, 4, 16] {
-                let other = picture(&spheres, &lights, &rays, Settings { packet, ..small });
+            for packet in [2, 4, 8, 16] {
+                let traced = Settings { primary: Primary::Trace, packet, ..small };
+                let other = picture(&spheres, &lights, &rays, traced);
                 assert!(other.color == first.color, "{samples} samples, packets of {packet}");
                 assert!(other.center == first.center);
             }

@@ -1,0 +1,441 @@
+//! What the eye sees first, by projection: the blocks of a grid front to back onto a tile of the picture.
+//!
+//! Finds the same hits as tracing the tile's rays, with the same arithmetic for each ray and sphere, but
+//! tests only the rays in a rectangle around each sphere. With the eye at the origin, view axes x, y, z
+//! (z forward) and slopes a = x/z, a sphere of radius r at c spans
+//!
+//! > a = (cx·cz ± r·√(cx² + cz² − r²)) / (cz² − r²)
+//!
+//! of which √(cx² + cz² − r²) ≤ |c| gives an upper bound that needs one root for both axes.
+//!
+//! Nothing is drawn that lies behind what is already there: a tile keeps the greatest distance in each
+//! of its 8 × 8 parts (64 rays each), so that a rectangle is a 64-bit mask, and whether anything shows in
+//! it takes four comparisons. All bounds are conservative; the order decides only how much work there is.
+
+use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
+use fearless_simd_macros::simd;
+use motes_grid::{Grid, Seen};
+
+use crate::intersect::{Sphere, bits, meet, radii_at, sixteen_centers};
+use crate::overview::{Extent, GROUP, GroupView, Lens, slack};
+use crate::packet::{LANES, NO_SLOT};
+use crate::tile::{Place, RayTile, SIDE_BLOCKS};
+use crate::traverse::{Counts, Spheres};
+
+/// Parts along a tile's side whose greatest distance is kept: two blocks each.
+const PARTS: usize = 8;
+
+/// Draws a system's spheres onto a tile: afterwards `slot` is set where one of them is nearest.
+/// `order` lists the groups that may show in the tile, nearest first.
+#[simd]
+pub(crate) fn project<S: Simd>(
+    simd: S,
+    (tile, place): (&mut RayTile, Place),
+    spheres: &Spheres<'_>,
+    (groups, order): (&[GroupView], &[u32]),
+    (rays, counts): (&motes_scene::Rays, &mut Counts),
+) {
+    let lenses: Vec<Lens> = spheres.classes.grids.iter().map(|g| Lens::new(rays, g)).collect();
+    let mut easel = Easel {
+        tile,
+        spheres,
+        lens: lenses[0],
+        corner: (place.corner.0 as f32, place.corner.1 as f32),
+        farthest: [f32::INFINITY; PARTS * PARTS],
+        farthest_of_all: f32::INFINITY,
+        stale: u64::MAX,
+        counts,
+    };
+    for group in order {
+        let group = &groups[*group as usize];
+        easel.refresh(simd);
+        // The nearest come first: all that follow are hidden too.
+        if group.whole.near >= easel.farthest_of_all {
+            break;
+        }
+        if let Some(area) = easel.area_of(group.whole)
+            && easel.shows(simd, area, group.whole.near)
+        {
+            easel.lens = lenses[group.class];
+            easel.group(simd, group);
+        }
+    }
+}
+
+/// A rectangle of blocks of a tile: first and last along x and y.
+type Area = [usize; 4];
+
+/// A tile on which a system is drawn.
+struct Easel<'a> {
+    tile: &'a mut RayTile,
+    spheres: &'a Spheres<'a>,
+    lens: Lens,
+    /// The tile's first pixel.
+    corner: (f32, f32),
+    /// Greatest distance of the rays of each part; never less than the truth.
+    farthest: [f32; PARTS * PARTS],
+    farthest_of_all: f32,
+    /// The parts whose greatest distance may have become less.
+    stale: u64,
+    counts: &'a mut Counts,
+}
+
+impl Easel<'_> {
+    /// The blocks of the tile that have a ray in the rectangle, if any.
+    #[inline(always)]
+    fn area_of(&self, extent: Extent) -> Option<Area> {
+        let [x, y] = self.tile.pattern.inset;
+        let side = self.tile.pattern.side as f32;
+        let most = side * SIDE_BLOCKS as f32 - 1.0;
+        let (x0, x1) = whole_pixels(extent.x, self.corner.0, x);
+        let (y0, y1) = whole_pixels(extent.y, self.corner.1, y);
+        if x0 > x1 || y0 > y1 || x1 < 0.0 || y1 < 0.0 || x0 > most || y0 > most {
+            return None;
+        }
+        let block = |pixel: f32| (pixel.clamp(0.0, most) / side) as usize;
+        Some([block(x0), block(x1), block(y0), block(y1)])
+    }
+
+    /// The parts that lie in an area.
+    #[inline(always)]
+    fn parts([x0, x1, y0, y1]: Area) -> u64 {
+        let row = (0xff_u64 >> (7 - x1 / 2)) & (0xff << (x0 / 2)) & 0xff;
+        let rows = (u64::MAX >> (8 * (7 - y1 / 2))) & (u64::MAX << (8 * (y0 / 2)));
+        (row * 0x0101_0101_0101_0101) & rows
+    }
+
+    /// The parts of the tile in which something at distance `near` would show.
+    #[inline(always)]
+    fn open<S: Simd>(&self, simd: S, near: f32) -> u64 {
+        let near = f32x16::splat(simd, near);
+        let mut open = 0;
+        for quarter in 0..4 {
+            let at = quarter * LANES;
+            let farthest = f32x16::from_slice(simd, &self.farthest[at..at + LANES]);
+            open |= farthest.simd_gt(near).to_bitmask() << at;
+        }
+        open
+    }
+
+    /// Whether something at distance `near` or more may show in an area.
+    #[inline(always)]
+    fn shows<S: Simd>(&self, simd: S, area: Area, near: f32) -> bool {
+        Self::parts(area) & self.open(simd, near) != 0
+    }
+
+    /// Brings the greatest distances up to date.
+    #[inline(always)]
+    fn refresh<S: Simd>(&mut self, simd: S) {
+        if self.stale == 0 {
+            return;
+        }
+        while self.stale != 0 {
+            let part = self.stale.trailing_zeros() as usize;
+            self.stale &= self.stale - 1;
+            let first = (part / PARTS * 2 * SIDE_BLOCKS + part % PARTS * 2) * LANES;
+            let below = first + SIDE_BLOCKS * LANES;
+            let distance = &self.tile.distance;
+            let a = f32x16::from_slice(simd, &distance[first..first + LANES]);
+            let b = f32x16::from_slice(simd, &distance[first + LANES..first + 2 * LANES]);
+            let c = f32x16::from_slice(simd, &distance[below..below + LANES]);
+            let d = f32x16::from_slice(simd, &distance[below + LANES..below + 2 * LANES]);
+            self.farthest[part] = a.max(b).max(c.max(d)).reduce_max();
+        }
+        let mut all = f32x16::from_slice(simd, &self.farthest[..LANES]);
+        for quarter in 1..4 {
+            let at = quarter * LANES;
+            all = all.max(f32x16::from_slice(simd, &self.farthest[at..at + LANES]));
+        }
+        self.farthest_of_all = all.reduce_max();
+    }
+
+    /// Draws the blocks of a group, nearest first.
+    #[inline(always)]
+    fn group<S: Simd>(&mut self, simd: S, group: &GroupView) {
+        let mut order = [(0.0, 0u8); GROUP];
+        let mut count = 0;
+        let side = self.tile.pattern.tile_side() as f32;
+        for first in (0..GROUP).step_by(LANES) {
+            let lanes = first..first + LANES;
+            let near = f32x16::from_slice(simd, &group.near[lanes.clone()]);
+            let x0 = f32x16::from_slice(simd, &group.rect[0][lanes.clone()]);
+            let x1 = f32x16::from_slice(simd, &group.rect[1][lanes.clone()]);
+            let y0 = f32x16::from_slice(simd, &group.rect[2][lanes.clone()]);
+            let y1 = f32x16::from_slice(simd, &group.rect[3][lanes]);
+            let meets = near.simd_lt(f32x16::splat(simd, self.farthest_of_all))
+                & x1.simd_ge(f32x16::splat(simd, self.corner.0))
+                & x0.simd_le(f32x16::splat(simd, self.corner.0 + side))
+                & y1.simd_ge(f32x16::splat(simd, self.corner.1))
+                & y0.simd_le(f32x16::splat(simd, self.corner.1 + side));
+            let mut meets = meets.to_bitmask();
+            while meets != 0 {
+                let block = first + meets.trailing_zeros() as usize;
+                meets &= meets - 1;
+                let mut at = count;
+                while at > 0 && order[at - 1].0 > group.near[block] {
+                    order[at] = order[at - 1];
+                    at -= 1;
+                }
+                order[at] = (group.near[block], block as u8);
+                count += 1;
+            }
+        }
+        for (near, block) in &order[..count] {
+            let block = *block as usize;
+            self.refresh(simd);
+            let extent = Extent {
+                near: *near,
+                x: (group.rect[0][block], group.rect[1][block]),
+                y: (group.rect[2][block], group.rect[3][block]),
+            };
+            let Some(area) = self.area_of(extent) else { continue };
+            if self.shows(simd, area, *near) {
+                self.block(simd, group, (group.block[block] as usize, Self::parts(area)));
+            }
+        }
+    }
+
+    /// Draws a block that shows in some of `parts`.
+    #[inline(always)]
+    fn block<S: Simd>(&mut self, simd: S, group: &GroupView, (index, parts): (usize, u64)) {
+        let spheres = self.spheres;
+        let grid = &spheres.classes.grids[group.class];
+        let seen = spheres.visible[group.class].block(grid, index);
+        let particles = grid.particles_of(index);
+        // Nothing of it shows behind the farthest ray of its parts.
+        let mut reach = 0f32;
+        let mut left = parts;
+        while left != 0 {
+            reach = reach.max(self.farthest[left.trailing_zeros() as usize]);
+            left &= left - 1;
+        }
+        let run = Run { grid, seen, block_first: particles.start, first_slot: group.first_slot };
+        if self.tile.eye.is_some() {
+            self.run::<S, true>(simd, run, (particles.start, particles.end), reach);
+        } else {
+            self.run::<S, false>(simd, run, (particles.start, particles.end), reach);
+        }
+    }
+
+    /// Draws the particles `from..to` that lie nearer than `reach`.
+    #[inline(always)]
+    fn run<S: Simd, const PERSPECTIVE: bool>(
+        &mut self,
+        simd: S,
+        run: Run<'_>,
+        (from, to): (usize, usize),
+        reach: f32,
+    ) {
+        let mut slot = from;
+        let mut frames = Frames::new();
+        while slot < to {
+            let count = (to - slot).min(LANES);
+            let mut may = u64::MAX >> (64 - count);
+            if let Seen::Mixed(words) = run.seen {
+                may &= bits(words, slot - run.block_first);
+            }
+            if may != 0 {
+                self.counts.spheres += u64::from(may.count_ones());
+                may &= self.frame::<S, PERSPECTIVE>(simd, (run.grid, slot), reach, &mut frames);
+            }
+            while may != 0 {
+                let lane = may.trailing_zeros() as usize;
+                may &= may - 1;
+                let area = frames.area(lane);
+                let near = frames.near[lane];
+                let open = Self::parts(area) & self.open(simd, near);
+                if open != 0 {
+                    let place = slot + lane;
+                    let sphere = Sphere {
+                        center: run.grid.center(place),
+                        radius: run.grid.radius_at(place),
+                        slot: run.first_slot + place as u32,
+                    };
+                    self.draw::<S, PERSPECTIVE>(simd, sphere, (area, open));
+                }
+            }
+            slot += count;
+        }
+    }
+
+    /// Least distances and areas of the sixteen spheres from `slot` on; gives which may show at all.
+    #[inline(always)]
+    fn frame<S: Simd, const PERSPECTIVE: bool>(
+        &self,
+        simd: S,
+        (grid, slot): (&Grid, usize),
+        reach: f32,
+        frames: &mut Frames,
+    ) -> u64 {
+        let rays = &self.lens.rays;
+        let [cx, cy, cz] = sixteen_centers(simd, grid, slot);
+        let radius = radii_at(simd, grid, slot) + self.lens.pad;
+        let ox = cx - rays.origin.x;
+        let oy = cy - rays.origin.y;
+        let oz = cz - rays.origin.z;
+        let x = along(simd, rays.right, [ox, oy, oz]);
+        let y = along(simd, rays.up, [ox, oy, oz]);
+        let z = along(simd, rays.forward, [ox, oy, oz]);
+        let scale = f32x16::splat(simd, self.lens.scale);
+        let zero = f32x16::splat(simd, 0.0);
+        let ahead = (z + radius).simd_gt(zero);
+        let (near, mx, my, half, whole) = if PERSPECTIVE {
+            let distance = z.mul_add(z, y.mul_add(y, x * x)).sqrt();
+            let square = z.mul_add(z, -(radius * radius));
+            let part = scale / square;
+            let (zp, half) = (z * part, radius * distance * part);
+            // The eye's plane cuts the sphere: it may be anywhere.
+            let cut = z.simd_le(radius * 1.001);
+            (distance - radius, x * zp, y * zp, half, cut)
+        } else {
+            let none = zero.simd_gt(zero);
+            (z - radius, x * scale, y * scale, radius * scale, none)
+        };
+        let half = half + slack(rays);
+        let side = self.tile.pattern.side as f32;
+        let most = side * SIDE_BLOCKS as f32 - 1.0;
+        let [inset_x, inset_y] = self.tile.pattern.inset;
+        let at_x = rays.center[0] - self.corner.0;
+        let at_y = rays.center[1] - self.corner.1;
+        let x0 = (mx - half + (at_x - inset_x.1)).ceil();
+        let x1 = (mx + half + (at_x - inset_x.0)).floor();
+        // Rows run downward.
+        let y0 = (-my - half + (at_y - inset_y.1)).ceil();
+        let y1 = (-my + half + (at_y - inset_y.0)).floor();
+        let most = f32x16::splat(simd, most);
+        let meets = x0.simd_le(x1)
+            & y0.simd_le(y1)
+            & x1.simd_ge(zero)
+            & y1.simd_ge(zero)
+            & x0.simd_le(most)
+            & y0.simd_le(most);
+        let shows = (meets | whole) & ahead & near.simd_lt(f32x16::splat(simd, reach));
+        let may = shows.to_bitmask();
+        if may == 0 {
+            return 0;
+        }
+        let per_side = f32x16::splat(simd, 1.0 / side);
+        let x0 = whole.select(zero, x0.max(zero)) * per_side;
+        let x1 = whole.select(most, x1.min(most)) * per_side;
+        let y0 = whole.select(zero, y0.max(zero)) * per_side;
+        let y1 = whole.select(most, y1.min(most)) * per_side;
+        near.store_slice(&mut frames.near);
+        i32x16::truncate_from(x0).store_slice(&mut frames.area[0]);
+        i32x16::truncate_from(x1).store_slice(&mut frames.area[1]);
+        i32x16::truncate_from(y0).store_slice(&mut frames.area[2]);
+        i32x16::truncate_from(y1).store_slice(&mut frames.area[3]);
+        may
+    }
+
+    /// Tests the rays of an area, in its `open` parts, against one sphere and keeps nearer hits. At
+    /// equal distance the lower index in the file wins, and an earlier system before a later.
+    #[inline(always)]
+    fn draw<S: Simd, const PERSPECTIVE: bool>(
+        &mut self,
+        simd: S,
+        sphere: Sphere,
+        (area, open): (Area, u64),
+    ) {
+        let [x0, x1, y0, y1] = area;
+        let center = sphere.center;
+        let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
+        let eye = self.tile.eye.unwrap_or_default();
+        let mut ox = f32x16::splat(simd, center.x - eye.x);
+        let mut oy = f32x16::splat(simd, center.y - eye.y);
+        let mut oz = f32x16::splat(simd, center.z - eye.z);
+        for y in y0..=y1 {
+            for x in x0..=x1 {
+                let part = y / 2 * PARTS + x / 2;
+                if open >> part & 1 == 0 {
+                    continue;
+                }
+                let at = (y * SIDE_BLOCKS + x) * LANES;
+                let lanes = at..at + LANES;
+                if !PERSPECTIVE {
+                    let [px, py, pz] = &self.tile.origin;
+                    ox = f32x16::splat(simd, center.x) - f32x16::from_slice(simd, &px[lanes.clone()]);
+                    oy = f32x16::splat(simd, center.y) - f32x16::from_slice(simd, &py[lanes.clone()]);
+                    oz = f32x16::splat(simd, center.z) - f32x16::from_slice(simd, &pz[lanes.clone()]);
+                }
+                self.counts.tests += LANES as u64;
+                let dx = f32x16::from_slice(simd, &self.tile.direction[0][lanes.clone()]);
+                let dy = f32x16::from_slice(simd, &self.tile.direction[1][lanes.clone()]);
+                let dz = f32x16::from_slice(simd, &self.tile.direction[2][lanes.clone()]);
+                let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+                let before = f32x16::from_slice(simd, &self.tile.distance[lanes.clone()]);
+                let nearer = hit & distance.simd_lt(before);
+                let ties = (hit & distance.simd_eq(before)).to_bitmask();
+                if nearer.any_true() {
+                    self.stale |= 1 << part;
+                    nearer
+                        .select(distance, before)
+                        .store_slice(&mut self.tile.distance[lanes.clone()]);
+                    let slots = u32x16::from_slice(simd, &self.tile.slot[lanes.clone()]);
+                    nearer
+                        .select(u32x16::splat(simd, sphere.slot), slots)
+                        .store_slice(&mut self.tile.slot[lanes.clone()]);
+                }
+                if ties != 0 {
+                    break_ties(self.spheres, &mut self.tile.slot[lanes], (sphere.slot, ties));
+                }
+            }
+        }
+    }
+}
+
+/// Particles of a block, and how their slots count.
+#[derive(Clone, Copy)]
+struct Run<'a> {
+    grid: &'a Grid,
+    seen: Seen<'a>,
+    block_first: usize,
+    first_slot: u32,
+}
+
+/// Least distances and areas of sixteen spheres.
+struct Frames {
+    near: [f32; LANES],
+    area: [[i32; LANES]; 4],
+}
+
+impl Frames {
+    fn new() -> Self {
+        Self { near: [0.0; LANES], area: [[0; LANES]; 4] }
+    }
+
+    #[inline(always)]
+    fn area(&self, lane: usize) -> Area {
+        let [x0, x1, y0, y1] = &self.area;
+        // The bounds are within the tile; the masks only tell the compiler.
+        [
+            x0[lane] as usize & 15,
+            x1[lane] as usize & 15,
+            y0[lane] as usize & 15,
+            y1[lane] as usize & 15,
+        ]
+    }
+}
+
+/// The first and last pixel from `corner` on whose samples, which lie in `inset` of each pixel, can lie
+/// in `span`.
+#[inline(always)]
+fn whole_pixels(span: (f32, f32), corner: f32, inset: (f32, f32)) -> (f32, f32) {
+    ((span.0 - corner - inset.1).ceil(), (span.1 - corner - inset.0).floor())
+}
+
+#[inline(always)]
+fn along<S: Simd>(simd: S, axis: glam::Vec3, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
+    let y = y.mul_add(f32x16::splat(simd, axis.y), x * axis.x);
+    z.mul_add(f32x16::splat(simd, axis.z), y)
+}
+
+/// Gives rays that a sphere meets as far away as the one they hold to the lower index.
+#[cold]
+fn break_ties(spheres: &Spheres<'_>, held: &mut [u32], (slot, ties): (u32, u64)) {
+    for (lane, held) in held.iter_mut().enumerate().filter(|(lane, _)| ties >> lane & 1 == 1) {
+        let _ = lane;
+        if *held != NO_SLOT && *held != slot && spheres.index(slot) < spheres.index(*held) {
+            *held = slot;
+        }
+    }
+}
