@@ -3,7 +3,9 @@
 use glam::Vec3;
 use motes_scene::Lights;
 
+use crate::near::Shelves;
 use crate::shaft::Cone;
+use crate::traverse::Spheres;
 
 /// Turns of the light's samples that neighbouring pixels differ by: a power of two.
 pub(crate) const TURNS: u32 = 64;
@@ -20,16 +22,18 @@ pub(crate) struct Aims {
     /// The cone around them.
     pub key_cone: Option<Cone>,
     /// Over the sphere: for each quarter and each sample, its rays.
-    fill: Vec<(Vec3, Cone)>,
+    fill: Vec<Vec3>,
     /// Occlusion rays of a sample, those below the surface included: about twice those above.
     pub fill_rays: usize,
     /// How far occlusion rays reach.
     pub reach: f32,
+    /// Where the blocks of the grids lie, if there are occlusion rays.
+    pub shelves: Shelves,
 }
 
 impl Aims {
     /// The directions for pixels of `samples` samples.
-    pub fn new(lights: &Lights, samples: u32) -> Self {
+    pub fn new(lights: &Lights, samples: u32, systems: &[Spheres<'_>]) -> Self {
         let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
         let key_rays = lights.key.shadow_rays;
         let mut key = Vec::new();
@@ -48,8 +52,7 @@ impl Aims {
             for sample in 0..samples {
                 for ray in 0..fill_rays {
                     let place = (ray * samples + sample, fill_rays * samples);
-                    let direction = fill_direction(place, quarter);
-                    fill.extend(Cone::around(&[direction]).map(|cone| (direction, cone)));
+                    fill.push(fill_direction(place, quarter));
                 }
             }
         }
@@ -61,6 +64,7 @@ impl Aims {
             fill,
             fill_rays: fill_rays as usize,
             reach: lights.occlusion_radius,
+            shelves: Shelves::new(if fill_rays > 0 { systems } else { &[] }),
         }
     }
 
@@ -78,7 +82,7 @@ impl Aims {
 
     /// The occlusion directions of a quarter and a sample.
     #[inline(always)]
-    pub fn fill_set(&self, quarter: u32, sample: u32) -> &[(Vec3, Cone)] {
+    pub fn fill_set(&self, quarter: u32, sample: u32) -> &[Vec3] {
         let first = (quarter * self.samples + sample) as usize * self.fill_rays;
         &self.fill[first..first + self.fill_rays]
     }

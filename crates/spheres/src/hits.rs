@@ -1,9 +1,12 @@
 //! The surfaces that the rays of a tile have hit first.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
+use motes_grid::{Particle, Radii};
 
+use crate::intersect::transposed;
+use crate::lanes::Lanes;
 use crate::packet::{LANES, NO_SLOT};
 use crate::render::Center;
 use crate::tile::{RayTile, TILE_RAYS};
@@ -15,24 +18,24 @@ use crate::traverse::Spheres;
 pub(crate) struct Hits {
     /// Per block, which of its rays have hit something.
     pub mask: [u16; TILE_RAYS / LANES],
-    pub position: [Vec<f32>; 3],
+    pub position: [Lanes<f32>; 3],
     /// Unit normal, towards where the ray came from.
-    pub normal: [Vec<f32>; 3],
+    pub normal: [Lanes<f32>; 3],
     /// Radius of the sphere.
-    pub radius: Vec<f32>,
+    pub radius: Lanes<f32>,
     /// Its index in the file's order.
-    pub index: Vec<u32>,
+    pub index: Lanes<u32>,
 }
 
 impl Hits {
     pub fn new() -> Self {
-        let zeros = || [vec![0.0; TILE_RAYS], vec![0.0; TILE_RAYS], vec![0.0; TILE_RAYS]];
+        let zeros = || [(); 3].map(|()| Lanes::new(0.0, TILE_RAYS));
         Self {
             mask: [0; TILE_RAYS / LANES],
             position: zeros(),
             normal: zeros(),
-            radius: vec![0.0; TILE_RAYS],
-            index: vec![0; TILE_RAYS],
+            radius: Lanes::new(0.0, TILE_RAYS),
+            index: Lanes::new(0, TILE_RAYS),
         }
     }
 
@@ -40,30 +43,39 @@ impl Hits {
     #[simd]
     pub fn gather<S: Simd>(&mut self, simd: S, rays: &RayTile, systems: &[Spheres<'_>]) -> usize {
         let mut count = 0;
+        // Most pictures show one grid, in which a slot is a place.
+        let only = match systems {
+            [system] if system.classes.grids.len() == 1 => Some(&system.classes.grids[0]),
+            _ => None,
+        };
         for block in 0..TILE_RAYS / LANES {
             let first = block * LANES;
-            let mut centers = [[0.0; LANES]; 3];
-            let mut mask = 0;
-            for lane in 0..LANES {
+            let slots = u32x16::from_slice(simd, &rays.hit_slot[first..first + LANES]);
+            let mask = slots.simd_lt(u32x16::splat(simd, NO_SLOT)).to_bitmask();
+            self.mask[block] = mask as u16;
+            if mask == 0 {
+                continue;
+            }
+            count += mask.count_ones() as usize;
+            let mut particles = [Particle::default(); LANES];
+            let mut left = mask;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
                 let slot = rays.hit_slot[first + lane];
-                if slot == NO_SLOT {
-                    continue;
+                let (grid, place) = match only {
+                    Some(grid) => (grid, slot as usize),
+                    None => systems[rays.hit_system[first + lane] as usize].locate(slot),
+                };
+                particles[lane] = grid.particles[place];
+                if let Radii::Each(radii) = &grid.radius {
+                    self.radius[first + lane] = radii[place];
+                } else {
+                    self.radius[first + lane] = grid.greatest_radius;
                 }
-                mask |= 1 << lane;
-                let system = &systems[rays.hit_system[first + lane] as usize];
-                let (grid, place) = system.locate(slot);
-                let center = grid.center(place);
-                centers[0][lane] = center.x;
-                centers[1][lane] = center.y;
-                centers[2][lane] = center.z;
-                self.radius[first + lane] = grid.radius_at(place);
-                self.index[first + lane] = grid.index(place);
+                self.index[first + lane] = particles[lane].index;
             }
-            self.mask[block] = mask;
-            if mask != 0 {
-                count += mask.count_ones() as usize;
-                self.surfaces(simd, rays, (first, &centers));
-            }
+            self.surfaces(simd, rays, (first, transposed(simd, bytemuck::cast_slice(&particles))));
         }
         count
     }
@@ -74,7 +86,7 @@ impl Hits {
         &mut self,
         simd: S,
         rays: &RayTile,
-        (first, centers): (usize, &[[f32; LANES]; 3]),
+        (first, centers): (usize, [f32x16<S>; 3]),
     ) {
         let lanes = first..first + LANES;
         let t = f32x16::from_slice(simd, &rays.distance[lanes.clone()]);
@@ -96,9 +108,7 @@ impl Hits {
         let px = t.mul_add_precise(dx, ox);
         let py = t.mul_add_precise(dy, oy);
         let pz = t.mul_add_precise(dz, oz);
-        let cx = f32x16::from_slice(simd, &centers[0]);
-        let cy = f32x16::from_slice(simd, &centers[1]);
-        let cz = f32x16::from_slice(simd, &centers[2]);
+        let [cx, cy, cz] = centers;
         let (nx, ny, nz) = (px - cx, py - cy, pz - cz);
         let length2 = nz.mul_add_precise(nz, ny.mul_add_precise(ny, nx * nx));
         // Rounding cannot flip it: a grazing ray's normal is at a right angle to the ray at most.

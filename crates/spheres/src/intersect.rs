@@ -217,7 +217,7 @@ pub(crate) fn sixteen_centers<S: Simd>(simd: S, grid: &Grid, at: usize) -> [f32x
 
 /// x, y and z of sixteen particles, four numbers each.
 #[inline(always)]
-fn transposed<S: Simd>(simd: S, numbers: &[f32]) -> [f32x16<S>; 3] {
+pub(crate) fn transposed<S: Simd>(simd: S, numbers: &[f32]) -> [f32x16<S>; 3] {
     // xyzi xyzi … becomes xzxz … and yiyi …, and these x …, z … and y ….
     let (xz0, yi0) = load(simd, numbers, 0).deinterleave(load(simd, numbers, LANES));
     let (xz1, yi1) = load(simd, numbers, 2 * LANES).deinterleave(load(simd, numbers, 3 * LANES));

@@ -13,9 +13,12 @@
 //! threads, the size of packets or of tiles.
 
 mod aims;
+mod beam;
 mod frustum;
 mod hits;
 mod intersect;
+mod lanes;
+mod near;
 mod occlude;
 mod overview;
 mod packet;

@@ -12,13 +12,15 @@
 //! directions of their own (interleaved sampling, Keller and Heidrich 2001); hits on the same sphere
 //! within such a square share what they see.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_scene::{KeyLight, Projection};
 
 use crate::aims::{Aims, TURNS};
+use crate::beam::{Beam, MOST};
 use crate::hits::Hits;
+use crate::near::Near;
 use crate::packet::LANES;
 use crate::render::View;
 use crate::shade::Reaching;
@@ -51,6 +53,8 @@ pub(crate) struct Work<'a> {
 pub(crate) struct Occluder {
     pub reaching: Reaching,
     bundle: Bundle,
+    beam: Beam,
+    near: Near,
     /// The hits by place: a key of their cell, and their ray.
     order: Vec<(u32, u32)>,
     points: Points,
@@ -76,7 +80,9 @@ impl Occluder {
     pub fn new() -> Self {
         Self {
             reaching: Reaching::new(),
-            bundle: Bundle::default(),
+            bundle: Bundle::new(),
+            beam: Beam::new(),
+            near: Near::default(),
             order: Vec::new(),
             points: Points::default(),
             key: Sums::new(),
@@ -87,7 +93,7 @@ impl Occluder {
     /// Finds what reaches the hits.
     #[simd]
     pub fn reach<S: Simd>(&mut self, simd: S, work: Work<'_>, counts: &mut Counts) {
-        self.open(work.hits, &work.view.lights.key);
+        self.open(simd, work.hits, &work.view.lights.key);
         let (shadows, occlusion) = (work.aims.key_rays > 0, work.aims.fill_rays > 0);
         if !shadows && !occlusion {
             return;
@@ -113,17 +119,22 @@ impl Occluder {
     }
 
     /// What reaches the hits in the open.
+    ///
+    /// While the whole round light is above the horizon this is the cosine; while it sets, over ±sin α
+    /// of the cosine, the quadratic that meets the cosine above and zero below with equal slopes.
     #[inline(always)]
-    fn open(&mut self, hits: &Hits, key: &KeyLight) {
-        let sin_half_angle = (1.0 - key.cos_half_angle * key.cos_half_angle).max(0.0).sqrt();
-        let [nx, ny, nz] = &hits.normal;
+    fn open<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight) {
+        let sine = (1.0 - light.cos_half_angle * light.cos_half_angle).max(1e-12).sqrt();
+        let d = light.direction;
+        let one = f32x16::splat(simd, 1.0);
         for block in (0..TILE_RAYS / LANES).filter(|block| hits.mask[*block] != 0) {
-            for ray in block * LANES..(block + 1) * LANES {
-                let d = key.direction;
-                let cosine = nx[ray] * d.x + ny[ray] * d.y + nz[ray] * d.z;
-                self.reaching.key[ray] = lit(cosine, sin_half_angle);
-                self.reaching.fill[ray] = 1.0;
-            }
+            let lanes = block * LANES..(block + 1) * LANES;
+            let nx = f32x16::from_slice(simd, &hits.normal[0][lanes.clone()]);
+            let ny = f32x16::from_slice(simd, &hits.normal[1][lanes.clone()]);
+            let nz = f32x16::from_slice(simd, &hits.normal[2][lanes.clone()]);
+            let cosine = nz * d.z + ny * d.y + nx * d.x;
+            lit(simd, cosine, sine).store_slice(&mut self.reaching.key[lanes.clone()]);
+            one.store_slice(&mut self.reaching.fill[lanes]);
         }
     }
 
@@ -161,7 +172,7 @@ impl Occluder {
     /// it has too many points.
     #[inline(always)]
     fn group(&self, work: Work<'_>, (from, most): (usize, f32)) -> usize {
-        let points = GROUP_POINTS * work.rays.pattern.samples as usize;
+        let points = (GROUP_POINTS * work.rays.pattern.samples as usize).min(MOST);
         let end = self.order.len().min(from + points);
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (at, (_, ray)) in self.order[from..end].iter().enumerate() {
@@ -195,7 +206,7 @@ impl Occluder {
         for point in 0..self.points.count {
             let (origin, normal) = self.points.get(point);
             let ray = self.points.ray[point] as usize;
-            let (x, y) = work.rays.pattern.pixel(ray);
+            let (x, y) = work.rays.pattern.pixel_of(ray);
             let first = work.aims.key_set(
                 turn(work.corner.0 + x, work.corner.1 + y),
                 work.first_sample + work.rays.pattern.sample(ray),
@@ -242,10 +253,18 @@ impl Occluder {
         let quarters = if pattern.side == 1 { 1 } else { 4 };
         let classes = quarters * pattern.samples;
         let class_of = |ray: u32| {
-            let (x, y) = pattern.pixel(ray as usize);
+            let (x, y) = pattern.pixel_of(ray as usize);
             let quarter = if quarters == 1 { 0 } else { x % 2 + y % 2 * 2 };
             quarter * pattern.samples + pattern.sample(ray as usize)
         };
+        let systems = work.view.systems;
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (_, ray) in &self.order[from..to] {
+            let position = work.hits.position_of(*ray as usize);
+            let lift = Vec3::splat(Points::lift(work, *ray as usize));
+            (low, high) = (low.min(position - lift), high.max(position + lift));
+        }
+        self.near.find(simd, &aims.shelves, (low, high), aims.reach);
         for class in 0..classes {
             self.points.clear();
             for (_, ray) in self.order[from..to].iter().filter(|(_, ray)| class_of(*ray) == class) {
@@ -256,14 +275,14 @@ impl Occluder {
             }
             let (quarter, sample) = (class / pattern.samples, class % pattern.samples);
             let directions = aims.fill_set(quarter, work.first_sample + sample);
-            let bounds = self.points.bounds(0, self.points.count);
             self.points.pad();
             self.points.clear_sums();
-            for (direction, cone) in directions {
-                self.points.aim(simd, *direction, aims.reach, &mut self.bundle);
-                if self.bundle.vectors() > 0 {
-                    self.bundle.block(simd, (cone, bounds, aims.reach), work.view.systems, counts);
-                    self.points.gather(simd, *direction, &self.bundle);
+            for direction in directions {
+                self.points.aim(simd, *direction, &mut self.beam);
+                if self.beam.rays > 0 {
+                    let near = (&self.near, &work.aims.shelves);
+                    self.beam.block(simd, (*direction, aims.reach), near, (systems, counts));
+                    self.points.gather(simd, &self.beam);
                 }
             }
             for point in 0..self.points.count {
@@ -353,8 +372,9 @@ struct Points {
     /// Sums over the rays of each point.
     visible: Vec<f32>,
     all: Vec<f32>,
-    /// Which vectors of points have a ray in the bundle at hand.
-    aimed: Vec<u32>,
+    /// Of each ray of the beam at hand, its cosine and its point.
+    cosine: Vec<f32>,
+    own: Vec<u32>,
 }
 
 impl Points {
@@ -372,15 +392,21 @@ impl Points {
     fn push(&mut self, work: Work<'_>, ray: u32) {
         let at = ray as usize;
         let (position, normal) = (work.hits.position_of(at), work.hits.normal_of(at));
-        // A thousandth of the radius, and what rounding of the coordinates may add to it.
-        let size = position.abs().max_element() + work.rays.distance[at];
-        let origin = position + normal * (1e-3 * work.hits.radius[at] + 1e-6 * size);
+        let origin = position + normal * Self::lift(work, at);
         for axis in 0..3 {
             self.origin[axis].push(origin[axis]);
             self.normal[axis].push(normal[axis]);
         }
         self.ray.push(ray);
         self.count += 1;
+    }
+
+    /// How far from its surface the rays of a hit start: a thousandth of the radius, and what rounding of
+    /// the coordinates may add to it.
+    #[inline(always)]
+    fn lift(work: Work<'_>, ray: usize) -> f32 {
+        let size = work.hits.position_of(ray).abs().max_element() + work.rays.distance[ray];
+        1e-3 * work.hits.radius[ray] + 1e-6 * size
     }
 
     fn get(&self, point: usize) -> (Vec3, Vec3) {
@@ -415,59 +441,52 @@ impl Points {
             sums.clear();
             sums.resize(lanes, 0.0);
         }
+        self.cosine.resize(MOST + LANES, 0.0);
+        self.own.resize(MOST + LANES, 0);
     }
 
-    /// Cosines of vector `first` of the points with a direction; what lies below is below zero.
+    /// Makes the beam of the rays of all points along `direction`, where it lies above the surface.
     #[inline(always)]
-    fn cosines<S: Simd>(&self, simd: S, direction: Vec3, first: usize) -> f32x16<S> {
-        let [nx, ny, nz] = &self.normal;
-        let nx = f32x16::from_slice(simd, &nx[first..first + LANES]);
-        let ny = f32x16::from_slice(simd, &ny[first..first + LANES]);
-        let nz = f32x16::from_slice(simd, &nz[first..first + LANES]);
-        nz * direction.z + ny * direction.y + nx * direction.x
-    }
-
-    /// Makes the bundle of the rays of all points along `direction`, where it lies above the surface.
-    #[inline(always)]
-    fn aim<S: Simd>(&mut self, simd: S, direction: Vec3, reach: f32, bundle: &mut Bundle) {
-        bundle.clear();
-        self.aimed.clear();
+    fn aim<S: Simd>(&mut self, simd: S, direction: Vec3, beam: &mut Beam) {
+        beam.rays = 0;
         let zero = f32x16::splat(simd, 0.0);
-        let d = [
-            f32x16::splat(simd, direction.x),
-            f32x16::splat(simd, direction.y),
-            f32x16::splat(simd, direction.z),
-        ];
+        let [nx, ny, nz] = &self.normal;
+        let [ox, oy, oz] = &self.origin;
         for first in (0..self.count).step_by(LANES) {
-            let above = self.cosines(simd, direction, first).simd_gt(zero);
-            if !above.any_true() {
+            let lanes = first..first + LANES;
+            let nx = f32x16::from_slice(simd, &nx[lanes.clone()]);
+            let ny = f32x16::from_slice(simd, &ny[lanes.clone()]);
+            let nz = f32x16::from_slice(simd, &nz[lanes.clone()]);
+            let cosine = nz * direction.z + ny * direction.y + nx * direction.x;
+            let above = cosine.simd_gt(zero);
+            let count = above.to_bitmask().count_ones() as usize;
+            if count == 0 {
                 continue;
             }
-            let reach = above.select(f32x16::splat(simd, reach), f32x16::splat(simd, LOST));
-            let [x, y, z] = &self.origin;
-            let origin = [
-                f32x16::from_slice(simd, &x[first..first + LANES]),
-                f32x16::from_slice(simd, &y[first..first + LANES]),
-                f32x16::from_slice(simd, &z[first..first + LANES]),
-            ];
-            bundle.push(origin, d, reach, (Vec3::ZERO, f32::INFINITY));
-            self.aimed.push(first as u32);
+            let to = beam.rays..beam.rays + LANES;
+            let x = f32x16::from_slice(simd, &ox[lanes.clone()]);
+            let y = f32x16::from_slice(simd, &oy[lanes.clone()]);
+            let z = f32x16::from_slice(simd, &oz[lanes]);
+            x.compress(above).store_slice(&mut beam.origin[0][to.clone()]);
+            y.compress(above).store_slice(&mut beam.origin[1][to.clone()]);
+            z.compress(above).store_slice(&mut beam.origin[2][to.clone()]);
+            cosine.compress(above).store_slice(&mut self.cosine[to.clone()]);
+            let own = u32x16::from_fn(simd, |lane| (first + lane) as u32);
+            own.compress(above).store_slice(&mut self.own[to]);
+            beam.rays += count;
         }
     }
 
-    /// Adds what the rays of the bundle along `direction` saw to the sums.
+    /// Adds what the rays of the beam saw to the sums of their points.
     #[inline(always)]
-    fn gather<S: Simd>(&mut self, simd: S, direction: Vec3, bundle: &Bundle) {
-        let zero = f32x16::splat(simd, 0.0);
-        for vector in 0..self.aimed.len() {
-            let first = self.aimed[vector] as usize;
-            let lanes = first..first + LANES;
-            let cosine = self.cosines(simd, direction, first).max(zero);
-            let visible = bundle.open(simd, vector).select(cosine, zero);
-            let sum = f32x16::from_slice(simd, &self.visible[lanes.clone()]) + visible;
-            sum.store_slice(&mut self.visible[lanes.clone()]);
-            let sum = f32x16::from_slice(simd, &self.all[lanes.clone()]) + cosine;
-            sum.store_slice(&mut self.all[lanes]);
+    fn gather<S: Simd>(&mut self, simd: S, beam: &Beam) {
+        for first in (0..beam.rays).step_by(LANES) {
+            let open = beam.open(simd, first).to_bitmask();
+            for lane in 0..LANES.min(beam.rays - first) {
+                let (point, cosine) = (self.own[first + lane] as usize, self.cosine[first + lane]);
+                self.all[point] += cosine;
+                self.visible[point] += if open >> lane & 1 == 1 { cosine } else { 0.0 };
+            }
         }
     }
 }
@@ -524,19 +543,12 @@ fn spread(v: u32) -> u32 {
 
 
 /// The part of a round light's strength that falls on a surface at cosine `cosine` from its middle.
-///
-/// While the whole light is above the horizon this is the cosine; while it sets, over ±sin α of the
-/// cosine, the quadratic that meets the cosine above and zero below with equal slopes.
-fn lit(cosine: f32, sin_half_angle: f32) -> f32 {
-    if cosine >= sin_half_angle {
-        cosine
-    } else if cosine <= -sin_half_angle {
-        0.0
-    } else {
-        (cosine + sin_half_angle).powi(2) / (4.0 * sin_half_angle)
-    }
+#[inline(always)]
+fn lit<S: Simd>(simd: S, cosine: f32x16<S>, sin_half_angle: f32) -> f32x16<S> {
+    let rising = (cosine + sin_half_angle).max(f32x16::splat(simd, 0.0));
+    let setting = rising * rising * (0.25 / sin_half_angle);
+    cosine.simd_ge(f32x16::splat(simd, sin_half_angle)).select(cosine, setting)
 }
-
 
 #[cfg(test)]
 mod tests {
@@ -544,12 +556,16 @@ mod tests {
 
     #[test]
     fn a_light_sets_smoothly() {
+        let all = |cosine: f32, sine: f32| {
+            let level = fearless_simd::Level::new();
+            fearless_simd::dispatch!(level, simd => lit(simd, f32x16::splat(simd, cosine), sine)[3])
+        };
         let s = 0.2;
-        assert_eq!(lit(1.0, s), 1.0);
-        assert_eq!(lit(-0.3, s), 0.0);
-        assert!((lit(0.2 - 1e-6, s) - 0.2).abs() < 1e-5);
-        assert!((lit(0.0, s) - 0.05).abs() < 1e-7);
-        assert_eq!(lit(0.3, 0.0), 0.3);
-        assert_eq!(lit(-0.3, 0.0), 0.0);
+        assert_eq!(all(1.0, s), 1.0);
+        assert_eq!(all(-0.3, s), 0.0);
+        assert!((all(0.2 - 1e-6, s) - 0.2).abs() < 1e-5);
+        assert!((all(0.0, s) - 0.05).abs() < 1e-7);
+        assert_eq!(all(0.3, 1e-6), 0.3);
+        assert_eq!(all(-0.3, 1e-6), 0.0);
     }
 }

@@ -22,6 +22,7 @@ pub(crate) struct Extent {
 }
 
 /// A group of blocks as the picture sees it.
+#[repr(align(64))]
 #[derive(Debug)]
 pub(crate) struct GroupView {
     /// Which grid of its system, and where that grid's slots begin in the system.
@@ -72,6 +73,7 @@ pub(crate) fn overview<S: Simd>(simd: S, rays: &Rays, spheres: &Spheres<'_>) -> 
 }
 
 /// Sixteen boxes: middles, half edges and radii of the spheres in them.
+#[repr(align(64))]
 struct Boxes {
     middle: [[f32; LANES]; 3],
     half: [[f32; LANES]; 3],

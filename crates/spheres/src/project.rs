@@ -16,7 +16,7 @@ use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use motes_grid::{Grid, Seen};
 
-use crate::intersect::{Sphere, bits, meet, radii_at, sixteen_centers};
+use crate::intersect::{bits, meet, radii_at, sixteen_centers};
 use crate::overview::{Extent, GROUP, GroupView, Lens, slack};
 use crate::packet::{LANES, NO_SLOT};
 use crate::tile::{Place, RayTile, SIDE_BLOCKS};
@@ -41,11 +41,13 @@ pub(crate) fn project<S: Simd>(
         spheres,
         lens: lenses[0],
         corner: (place.corner.0 as f32, place.corner.1 as f32),
+        limit: [f32::INFINITY; SIDE_BLOCKS * SIDE_BLOCKS],
         farthest: [f32::INFINITY; PARTS * PARTS],
         farthest_of_all: f32::INFINITY,
         stale: u64::MAX,
         counts,
     };
+    easel.measure(simd);
     for group in order {
         let group = &groups[*group as usize];
         easel.refresh(simd);
@@ -66,12 +68,15 @@ pub(crate) fn project<S: Simd>(
 type Area = [usize; 4];
 
 /// A tile on which a system is drawn.
+#[repr(align(64))]
 struct Easel<'a> {
     tile: &'a mut RayTile,
     spheres: &'a Spheres<'a>,
     lens: Lens,
     /// The tile's first pixel.
     corner: (f32, f32),
+    /// Greatest distance of the rays of each block.
+    limit: [f32; SIDE_BLOCKS * SIDE_BLOCKS],
     /// Greatest distance of the rays of each part; never less than the truth.
     farthest: [f32; PARTS * PARTS],
     farthest_of_all: f32,
@@ -123,7 +128,16 @@ impl Easel<'_> {
         Self::parts(area) & self.open(simd, near) != 0
     }
 
-    /// Brings the greatest distances up to date.
+    /// Takes the greatest distance of each block from its rays.
+    #[inline(always)]
+    fn measure<S: Simd>(&mut self, simd: S) {
+        for (block, limit) in self.limit.iter_mut().enumerate() {
+            let rays = &self.tile.distance[block * LANES..(block + 1) * LANES];
+            *limit = f32x16::from_slice(simd, rays).reduce_max();
+        }
+    }
+
+    /// Brings the greatest distances of the parts up to date.
     #[inline(always)]
     fn refresh<S: Simd>(&mut self, simd: S) {
         if self.stale == 0 {
@@ -132,14 +146,10 @@ impl Easel<'_> {
         while self.stale != 0 {
             let part = self.stale.trailing_zeros() as usize;
             self.stale &= self.stale - 1;
-            let first = (part / PARTS * 2 * SIDE_BLOCKS + part % PARTS * 2) * LANES;
-            let below = first + SIDE_BLOCKS * LANES;
-            let distance = &self.tile.distance;
-            let a = f32x16::from_slice(simd, &distance[first..first + LANES]);
-            let b = f32x16::from_slice(simd, &distance[first + LANES..first + 2 * LANES]);
-            let c = f32x16::from_slice(simd, &distance[below..below + LANES]);
-            let d = f32x16::from_slice(simd, &distance[below + LANES..below + 2 * LANES]);
-            self.farthest[part] = a.max(b).max(c.max(d)).reduce_max();
+            let first = part / PARTS * 2 * SIDE_BLOCKS + part % PARTS * 2;
+            let limit = &self.limit[first..first + SIDE_BLOCKS + 2];
+            let below = limit[SIDE_BLOCKS].max(limit[SIDE_BLOCKS + 1]);
+            self.farthest[part] = limit[0].max(limit[1]).max(below);
         }
         let mut all = f32x16::from_slice(simd, &self.farthest[..LANES]);
         for quarter in 1..4 {
@@ -226,9 +236,13 @@ impl Easel<'_> {
         (from, to): (usize, usize),
         reach: f32,
     ) {
-        let mut slot = from;
         let mut frames = Frames::new();
-        while slot < to {
+        let chunks = (to - from).div_ceil(LANES);
+        // Cells run upward in z: a look downward meets the last ones first.
+        let downward = self.lens.rays.forward.z < 0.0;
+        for chunk in 0..chunks {
+            let chunk = if downward { chunks - 1 - chunk } else { chunk };
+            let slot = from + chunk * LANES;
             let count = (to - slot).min(LANES);
             let mut may = u64::MAX >> (64 - count);
             if let Seen::Mixed(words) = run.seen {
@@ -243,18 +257,20 @@ impl Easel<'_> {
                 may &= may - 1;
                 let area = frames.area(lane);
                 let near = frames.near[lane];
-                let open = Self::parts(area) & self.open(simd, near);
-                if open != 0 {
-                    let place = slot + lane;
-                    let sphere = Sphere {
-                        center: run.grid.center(place),
-                        radius: run.grid.radius_at(place),
-                        slot: run.first_slot + place as u32,
+                let [x0, x1, y0, y1] = area;
+                // Small ones find out block by block.
+                let small = x1 - x0 < 2 && y1 - y0 < 2;
+                if small || Self::parts(area) & self.open(simd, near) != 0 {
+                    let sphere = Drawn {
+                        x: frames.center[0][lane],
+                        y: frames.center[1][lane],
+                        z: frames.center[2][lane],
+                        r2: frames.r2[lane],
+                        slot: run.first_slot + (slot + lane) as u32,
                     };
-                    self.draw::<S, PERSPECTIVE>(simd, sphere, (area, open));
+                    self.draw::<S, PERSPECTIVE>(simd, sphere, (area, near));
                 }
             }
-            slot += count;
         }
     }
 
@@ -269,7 +285,8 @@ impl Easel<'_> {
     ) -> u64 {
         let rays = &self.lens.rays;
         let [cx, cy, cz] = sixteen_centers(simd, grid, slot);
-        let radius = radii_at(simd, grid, slot) + self.lens.pad;
+        let own_radius = radii_at(simd, grid, slot);
+        let radius = own_radius + self.lens.pad;
         let ox = cx - rays.origin.x;
         let oy = cy - rays.origin.y;
         let oz = cz - rays.origin.z;
@@ -320,6 +337,12 @@ impl Easel<'_> {
         let y0 = whole.select(zero, y0.max(zero)) * per_side;
         let y1 = whole.select(most, y1.min(most)) * per_side;
         near.store_slice(&mut frames.near);
+        (own_radius * own_radius).store_slice(&mut frames.r2);
+        // From where the rays start, if they all start there.
+        let [cx, cy, cz] = if PERSPECTIVE { [ox, oy, oz] } else { [cx, cy, cz] };
+        cx.store_slice(&mut frames.center[0]);
+        cy.store_slice(&mut frames.center[1]);
+        cz.store_slice(&mut frames.center[2]);
         i32x16::truncate_from(x0).store_slice(&mut frames.area[0]);
         i32x16::truncate_from(x1).store_slice(&mut frames.area[1]);
         i32x16::truncate_from(y0).store_slice(&mut frames.area[2]);
@@ -327,35 +350,34 @@ impl Easel<'_> {
         may
     }
 
-    /// Tests the rays of an area, in its `open` parts, against one sphere and keeps nearer hits. At
+    /// Tests the rays of an area against one sphere no nearer than `near` and keeps nearer hits. At
     /// equal distance the lower index in the file wins, and an earlier system before a later.
     #[inline(always)]
     fn draw<S: Simd, const PERSPECTIVE: bool>(
         &mut self,
         simd: S,
-        sphere: Sphere,
-        (area, open): (Area, u64),
+        sphere: Drawn,
+        (area, near): (Area, f32),
     ) {
         let [x0, x1, y0, y1] = area;
-        let center = sphere.center;
-        let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
-        let eye = self.tile.eye.unwrap_or_default();
-        let mut ox = f32x16::splat(simd, center.x - eye.x);
-        let mut oy = f32x16::splat(simd, center.y - eye.y);
-        let mut oz = f32x16::splat(simd, center.z - eye.z);
+        let r2 = f32x16::splat(simd, sphere.r2);
+        let cx = f32x16::splat(simd, sphere.x);
+        let cy = f32x16::splat(simd, sphere.y);
+        let cz = f32x16::splat(simd, sphere.z);
+        let (mut ox, mut oy, mut oz) = (cx, cy, cz);
         for y in y0..=y1 {
             for x in x0..=x1 {
-                let part = y / 2 * PARTS + x / 2;
-                if open >> part & 1 == 0 {
+                let block = y * SIDE_BLOCKS + x;
+                if near >= self.limit[block] {
                     continue;
                 }
-                let at = (y * SIDE_BLOCKS + x) * LANES;
+                let at = block * LANES;
                 let lanes = at..at + LANES;
                 if !PERSPECTIVE {
                     let [px, py, pz] = &self.tile.origin;
-                    ox = f32x16::splat(simd, center.x) - f32x16::from_slice(simd, &px[lanes.clone()]);
-                    oy = f32x16::splat(simd, center.y) - f32x16::from_slice(simd, &py[lanes.clone()]);
-                    oz = f32x16::splat(simd, center.z) - f32x16::from_slice(simd, &pz[lanes.clone()]);
+                    ox = cx - f32x16::from_slice(simd, &px[lanes.clone()]);
+                    oy = cy - f32x16::from_slice(simd, &py[lanes.clone()]);
+                    oz = cz - f32x16::from_slice(simd, &pz[lanes.clone()]);
                 }
                 self.counts.tests += LANES as u64;
                 let dx = f32x16::from_slice(simd, &self.tile.direction[0][lanes.clone()]);
@@ -366,10 +388,10 @@ impl Easel<'_> {
                 let nearer = hit & distance.simd_lt(before);
                 let ties = (hit & distance.simd_eq(before)).to_bitmask();
                 if nearer.any_true() {
-                    self.stale |= 1 << part;
-                    nearer
-                        .select(distance, before)
-                        .store_slice(&mut self.tile.distance[lanes.clone()]);
+                    self.stale |= 1 << (y / 2 * PARTS + x / 2);
+                    let nearest = nearer.select(distance, before);
+                    nearest.store_slice(&mut self.tile.distance[lanes.clone()]);
+                    self.limit[block] = nearest.reduce_max();
                     let slots = u32x16::from_slice(simd, &self.tile.slot[lanes.clone()]);
                     nearer
                         .select(u32x16::splat(simd, sphere.slot), slots)
@@ -392,15 +414,33 @@ struct Run<'a> {
     first_slot: u32,
 }
 
-/// Least distances and areas of sixteen spheres.
+/// A sphere to be drawn: its centre, from where the rays start if they all start at one point, and the
+/// square of its radius.
+struct Drawn {
+    x: f32,
+    y: f32,
+    z: f32,
+    r2: f32,
+    slot: u32,
+}
+
+/// Sixteen spheres, their least distances and areas.
+#[repr(align(64))]
 struct Frames {
+    center: [[f32; LANES]; 3],
+    r2: [f32; LANES],
     near: [f32; LANES],
     area: [[i32; LANES]; 4],
 }
 
 impl Frames {
     fn new() -> Self {
-        Self { near: [0.0; LANES], area: [[0; LANES]; 4] }
+        Self {
+            center: [[0.0; LANES]; 3],
+            r2: [0.0; LANES],
+            near: [0.0; LANES],
+            area: [[0; LANES]; 4],
+        }
     }
 
     #[inline(always)]

@@ -209,7 +209,7 @@ impl<'a> Plan<'a> {
             rounds.push(pattern);
             left = &left[pattern.samples as usize..];
         }
-        let mut plan = Self { view, settings, rounds, groups: Vec::new(), shown: Vec::new(), aims: Aims::new(view.lights, settings.samples) };
+        let mut plan = Self { view, settings, rounds, groups: Vec::new(), shown: Vec::new(), aims: Aims::new(view.lights, settings.samples, view.systems) };
         if settings.primary == Primary::Project {
             for spheres in view.systems {
                 let groups =

@@ -3,14 +3,15 @@
 //! A surface of albedo ρ and unit normal n sends ρ·(key · reaching key + fill(n) · reaching fill +
 //! ambient) to the eye.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{f32x16, mask32x16, prelude::*};
 use fearless_simd_macros::simd;
 use glam::Vec3;
 
 use crate::hits::Hits;
+use crate::lanes::Lanes;
 use crate::packet::LANES;
 use crate::render::View;
-use crate::tile::{RayTile, TILE_RAYS};
+use crate::tile::{Pattern, RayTile, SIDE_BLOCKS, TILE_RAYS};
 
 /// The colour of each particle.
 pub trait Paint: Sync {
@@ -41,7 +42,7 @@ pub(crate) fn shade<S: Simd>(
     simd: S,
     (rays, hits, reaching): (&RayTile, &Hits, &Reaching),
     view: View<'_>,
-    canvas: Canvas<'_>,
+    mut canvas: Canvas<'_>,
 ) {
     let lights = view.lights;
     let one_system = view.systems.len() == 1;
@@ -75,24 +76,54 @@ pub(crate) fn shade<S: Simd>(
         let fill = f32x16::from_slice(simd, &reaching.fill[lanes]);
         let up = nz * lights.up.z + ny * lights.up.y + nx * lights.up.x;
         let above = half * up + half;
-        let mut light = [[0.0; LANES]; 3];
+        let hit = mask32x16::from_bitmask(simd, u64::from(hits.mask[block]));
+        let zero = f32x16::splat(simd, 0.0);
+        let mut light = [zero; 4];
         for channel in 0..3 {
             let of_fill = above * sky[channel] + lights.ground[channel];
             let sum = key * lights.key.color[channel] + of_fill * fill + lights.ambient[channel];
-            let sum = sum * f32x16::from_slice(simd, &albedo[channel]) * canvas.weight;
-            sum.store_slice(&mut light[channel]);
+            let albedo = f32x16::from_slice(simd, &albedo[channel]);
+            light[channel] = hit.select(sum * albedo * canvas.weight, zero);
         }
-        let mut left = hits.mask[block];
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let (x, y) = rays.pattern.pixel(block * LANES + lane);
-            let at = (canvas.at.1 + y) * canvas.width + canvas.at.0 + x;
-            let sum = &mut canvas.color[at as usize];
-            sum[0] += light[0][lane];
-            sum[1] += light[1][lane];
-            sum[2] += light[2][lane];
-            sum[3] += canvas.weight;
+        light[3] = hit.select(f32x16::splat(simd, canvas.weight), zero);
+        canvas.add(&rays.pattern, block, light);
+    }
+}
+
+impl Canvas<'_> {
+    /// Adds the light of a block's rays to their pixels, always in the same order.
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, pattern: &Pattern, block: usize, light: [f32x16<S>; 4]) {
+        // Red, green, blue and cover of one ray after another.
+        let mut by_ray = [[0.0; 4]; LANES];
+        let [red, green, blue, cover] = light;
+        let (rb_low, rb_high) = red.interleave(blue);
+        let (gc_low, gc_high) = green.interleave(cover);
+        let numbers: &mut [f32] = by_ray.as_flattened_mut();
+        let (first, second) = rb_low.interleave(gc_low);
+        let (third, fourth) = rb_high.interleave(gc_high);
+        first.store_slice(&mut numbers[..LANES]);
+        second.store_slice(&mut numbers[LANES..2 * LANES]);
+        third.store_slice(&mut numbers[2 * LANES..3 * LANES]);
+        fourth.store_slice(&mut numbers[3 * LANES..]);
+
+        let side = pattern.side as usize;
+        let samples = pattern.samples as usize;
+        let (x, y) = (block % SIDE_BLOCKS * side, block / SIDE_BLOCKS * side);
+        let (x, y) = (self.at.0 as usize + x, self.at.1 as usize + y);
+        let width = self.width as usize;
+        let height = self.color.len() / width;
+        for row in 0..side.min(height.saturating_sub(y)) {
+            let from = (y + row) * width + x;
+            let pixels = side.min(width.saturating_sub(x));
+            for (pixel, sum) in self.color[from..from + pixels].iter_mut().enumerate() {
+                let first = (row * side + pixel) * samples;
+                for ray in &by_ray[first..first + samples] {
+                    for (sum, light) in sum.iter_mut().zip(ray) {
+                        *sum += light;
+                    }
+                }
+            }
         }
     }
 }
@@ -101,13 +132,13 @@ pub(crate) fn shade<S: Simd>(
 #[derive(Debug)]
 pub(crate) struct Reaching {
     /// Mean of visible · max(0, cosine) over the key light.
-    pub key: Vec<f32>,
+    pub key: Lanes<f32>,
     /// Part of the cosine-weighted sky that is open.
-    pub fill: Vec<f32>,
+    pub fill: Lanes<f32>,
 }
 
 impl Reaching {
     pub fn new() -> Self {
-        Self { key: vec![0.0; TILE_RAYS], fill: vec![1.0; TILE_RAYS] }
+        Self { key: Lanes::new(0.0, TILE_RAYS), fill: Lanes::new(1.0, TILE_RAYS) }
     }
 }

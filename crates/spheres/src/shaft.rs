@@ -19,6 +19,7 @@ use motes_grid::{Grid, Seen, Visibility};
 
 use crate::frustum::Frustum;
 use crate::intersect::{Cull, Sphere, bits, cull};
+use crate::lanes::Lanes;
 use crate::packet::LANES;
 use crate::traverse::{Counts, Spheres, Steps, clip};
 
@@ -28,16 +29,16 @@ pub(crate) const LOST: f32 = f32::NEG_INFINITY;
 const FEW: usize = 4;
 
 /// Rays that start close together and run much the same way, in vectors of sixteen.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Bundle {
     vectors: usize,
-    origin: [Vec<f32>; 3],
-    direction: [Vec<f32>; 3],
+    origin: [Lanes<f32>; 3],
+    direction: [Lanes<f32>; 3],
     /// How far each ray looks; −∞ once it is blocked.
-    reach: Vec<f32>,
+    reach: Lanes<f32>,
     /// Middle and spread of the origins of each vector; the spread is −∞ once all of it is blocked.
-    middle: [Vec<f32>; 3],
-    spread: Vec<f32>,
+    middle: [Lanes<f32>; 3],
+    spread: Lanes<f32>,
 }
 
 /// The directions of a bundle: what bounds them.
@@ -142,14 +143,21 @@ impl Cone {
 }
 
 impl Bundle {
+    pub fn new() -> Self {
+        let none = || [(); 3].map(|()| Lanes::new(0.0, 0));
+        Self {
+            vectors: 0,
+            origin: none(),
+            direction: none(),
+            reach: Lanes::new(LOST, 0),
+            middle: none(),
+            spread: Lanes::new(LOST, 0),
+        }
+    }
+
     /// Removes all rays.
     pub fn clear(&mut self) {
         self.vectors = 0;
-    }
-
-    /// How many vectors of sixteen rays there are.
-    pub fn vectors(&self) -> usize {
-        self.vectors
     }
 
     /// Adds sixteen rays that reach as far as `reach` says; those with no reach are none. `around` is
@@ -186,13 +194,6 @@ impl Bundle {
         }
         self.reach.resize(vectors * LANES, LOST);
         self.spread.resize(vectors, LOST);
-    }
-
-    /// Which of the sixteen rays of vector `vector` are not blocked.
-    #[inline(always)]
-    pub fn open<S: Simd>(&self, simd: S, vector: usize) -> mask32x16<S> {
-        let reach = f32x16::from_slice(simd, &self.reach[vector * LANES..(vector + 1) * LANES]);
-        reach.simd_gt(f32x16::splat(simd, LOST))
     }
 
     /// Whether ray `ray`, counted through the vectors, is not blocked.
@@ -388,19 +389,7 @@ impl<S: Simd> Walk<'_, S> {
         let dz = load(simd, &bundle.direction[2], lanes.start);
         let reach = load(simd, &bundle.reach, lanes.start);
         self.counts.tests += LANES as u64;
-        let zero = f32x16::splat(simd, 0.0);
-        let b = z.mul_add_precise(dz, y.mul_add_precise(dy, x * dx));
-        let minus_b = -b;
-        let px = minus_b.mul_add_precise(dx, x);
-        let py = minus_b.mul_add_precise(dy, y);
-        let pz = minus_b.mul_add_precise(dz, z);
-        let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
-        let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
-        // The chord b ± √inside and 0..reach overlap.
-        let beyond = b - reach;
-        let blocks = inside.simd_ge(zero)
-            & (b.simd_gt(zero) | inside.simd_gt(b * b))
-            & (beyond.simd_lt(zero) | inside.simd_gt(beyond * beyond));
+        let blocks = blocks(simd, [x, y, z], [dx, dy, dz], (sphere.radius, reach));
         if blocks.any_true() {
             let blocked = f32x16::splat(simd, LOST);
             let reach = blocks.select(blocked, reach);
@@ -411,6 +400,30 @@ impl<S: Simd> Walk<'_, S> {
             }
         }
     }
+}
+
+/// Which of sixteen rays with these directions and reaches a sphere is in the way of, whose centre lies
+/// at `oc` from where they start: whose chord b ± √(r² − p²) overlaps 0..reach.
+#[inline(always)]
+pub(crate) fn blocks<S: Simd>(
+    simd: S,
+    oc: [f32x16<S>; 3],
+    direction: [f32x16<S>; 3],
+    (radius, reach): (f32, f32x16<S>),
+) -> mask32x16<S> {
+    let ([x, y, z], [dx, dy, dz]) = (oc, direction);
+    let zero = f32x16::splat(simd, 0.0);
+    let b = z.mul_add_precise(dz, y.mul_add_precise(dy, x * dx));
+    let minus_b = -b;
+    let px = minus_b.mul_add_precise(dx, x);
+    let py = minus_b.mul_add_precise(dy, y);
+    let pz = minus_b.mul_add_precise(dz, z);
+    let r2 = f32x16::splat(simd, radius * radius);
+    let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
+    let beyond = b - reach;
+    inside.simd_ge(zero)
+        & (b.simd_gt(zero) | inside.simd_gt(b * b))
+        & (beyond.simd_lt(zero) | inside.simd_gt(beyond * beyond))
 }
 
 #[inline(always)]

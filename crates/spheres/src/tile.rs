@@ -9,6 +9,7 @@ use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_scene::{Projection, Rays};
 
+use crate::lanes::Lanes;
 use crate::packet::{BLOCKED, LANES, NO_SLOT};
 
 /// Blocks along a tile's side.
@@ -23,6 +24,8 @@ pub(crate) struct Pattern {
     pub side: u32,
     /// Samples in each pixel: 1, 4 or 16.
     pub samples: u32,
+    /// The pixel of each ray, from the block's corner.
+    pub pixel: [(u8, u8); LANES],
     /// Place of each ray from the block's corner, pixels.
     pub x: [f32; LANES],
     pub y: [f32; LANES],
@@ -39,10 +42,17 @@ impl Pattern {
             _ => (4, 1),
         };
         let offsets = &offsets[..samples as usize];
-        let mut pattern =
-            Self { side, samples, x: [0.0; LANES], y: [0.0; LANES], inset: [(1.0, 0.0); 2] };
+        let mut pattern = Self {
+            side,
+            samples,
+            pixel: [(0, 0); LANES],
+            x: [0.0; LANES],
+            y: [0.0; LANES],
+            inset: [(1.0, 0.0); 2],
+        };
         for lane in 0..LANES as u32 {
             let (pixel, sample) = (lane / samples, (lane % samples) as usize);
+            pattern.pixel[lane as usize] = ((pixel % side) as u8, (pixel / side) as u8);
             pattern.x[lane as usize] = (pixel % side) as f32 + offsets[sample][0];
             pattern.y[lane as usize] = (pixel / side) as f32 + offsets[sample][1];
         }
@@ -77,10 +87,10 @@ impl Pattern {
     }
 
     /// The pixel of a ray within the tile.
-    pub fn pixel(&self, ray: usize) -> (u32, u32) {
-        let (block, pixel) = (ray / LANES, (ray % LANES) as u32 / self.samples);
+    pub fn pixel_of(&self, ray: usize) -> (u32, u32) {
+        let (block, (dx, dy)) = (ray / LANES, self.pixel[ray % LANES]);
         let (x, y) = ((block % SIDE_BLOCKS) as u32, (block / SIDE_BLOCKS) as u32);
-        (x * self.side + pixel % self.side, y * self.side + pixel / self.side)
+        (x * self.side + u32::from(dx), y * self.side + u32::from(dy))
     }
 }
 
@@ -90,14 +100,14 @@ pub(crate) struct RayTile {
     pub pattern: Pattern,
     /// Where all rays start, if they start at one point; else each has its own `origin`.
     pub eye: Option<Vec3>,
-    pub origin: [Vec<f32>; 3],
-    pub direction: [Vec<f32>; 3],
+    pub origin: [Lanes<f32>; 3],
+    pub direction: [Lanes<f32>; 3],
     /// Distance of the nearest hit; +∞ for none, [`BLOCKED`] for rays that are not wanted.
-    pub distance: Vec<f32>,
+    pub distance: Lanes<f32>,
     /// Where in the grids of the system at hand the nearest sphere lies, if that system has it.
-    pub slot: Vec<u32>,
+    pub slot: Lanes<u32>,
     /// The slot of the nearest sphere of all systems, or [`NO_SLOT`].
-    pub hit_slot: Vec<u32>,
+    pub hit_slot: Lanes<u32>,
     /// The system of the nearest sphere.
     pub hit_system: Vec<u16>,
 }
@@ -111,15 +121,15 @@ pub(crate) struct Place {
 
 impl RayTile {
     pub fn new() -> Self {
-        let zeros = || [vec![0.0; TILE_RAYS], vec![0.0; TILE_RAYS], vec![0.0; TILE_RAYS]];
+        let zeros = || [(); 3].map(|()| Lanes::new(0.0, TILE_RAYS));
         Self {
             pattern: Pattern::of(&[[0.5; 2]]),
             eye: None,
             origin: zeros(),
             direction: zeros(),
-            distance: vec![BLOCKED; TILE_RAYS],
-            slot: vec![NO_SLOT; TILE_RAYS],
-            hit_slot: vec![NO_SLOT; TILE_RAYS],
+            distance: Lanes::new(BLOCKED, TILE_RAYS),
+            slot: Lanes::new(NO_SLOT, TILE_RAYS),
+            hit_slot: Lanes::new(NO_SLOT, TILE_RAYS),
             hit_system: vec![0; TILE_RAYS],
         }
     }
@@ -179,7 +189,7 @@ impl RayTile {
             return;
         }
         for ray in 0..TILE_RAYS {
-            let (x, y) = self.pattern.pixel(ray);
+            let (x, y) = self.pattern.pixel_of(ray);
             let outside = x >= width || y >= height;
             if outside || finished.is_some_and(|f| f[(y * width + x) as usize]) {
                 self.distance[ray] = BLOCKED;
@@ -206,6 +216,12 @@ impl RayTile {
 
     /// Ends a system: where its spheres are nearest, they are the hits.
     pub fn end_system(&mut self, system: u16) {
+        if system == 0 {
+            // The first system's are all there are yet.
+            std::mem::swap(&mut self.slot, &mut self.hit_slot);
+            self.hit_system.fill(0);
+            return;
+        }
         for ray in (0..TILE_RAYS).filter(|ray| self.slot[*ray] != NO_SLOT) {
             self.hit_slot[ray] = self.slot[ray];
             self.hit_system[ray] = system;
@@ -235,7 +251,7 @@ mod tests {
                 for x in 0..pattern.tile_side() {
                     for sample in 0..samples {
                         let ray = pattern.ray((x, y), sample);
-                        assert_eq!(pattern.pixel(ray), (x, y));
+                        assert_eq!(pattern.pixel_of(ray), (x, y));
                         assert!(!std::mem::replace(&mut seen[ray], true));
                         let lane = ray % LANES;
                         let offset = offsets[sample as usize][0];
