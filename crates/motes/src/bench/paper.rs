@@ -4,12 +4,12 @@
 //! cell is the median of some frames of one view, all columns of a row measured in turns.
 
 use fearless_simd::Level;
-use motes_scene::{Lights, Rays, RelativeTo, Scene};
+use motes_scene::{Lights, Primary, Rays, RelativeTo, Scene};
 use motes_spheres::Spheres;
 
 use super::draw::{self, Culling, Drawn, SphereCenter, Way};
 use super::sets::{BLOCK, Built, LAMBDA, Loaded, SETS, params};
-use super::shot::{self, OneColor};
+use super::shot::{Shot, Studio, White};
 use super::single_ray::SingleRay;
 use super::standard_grid::{self, Insert, Standard, StandardGrid};
 use super::table::{Cell, Table};
@@ -274,39 +274,37 @@ impl Bench {
         table.push(loaded.label(), cells, self.hashes(&all));
     }
 
-    /// The renderer's own picture with so many shadow rays.
-    fn product(&self, scenery: &Scenery<'_>, lights: &Lights, shadow_rays: u32) -> Vec<u32> {
-        let mut lights = *lights;
-        lights.key.shadow_rays = shadow_rays;
-        let shot = shot::Shot {
-            rays: scenery.rays,
-            spheres: scenery.built.spheres(),
-            paint: &OneColor(glam::Vec3::ONE),
-            lights: &lights,
-            size: self.size,
-            samples: 1,
-            packet: PACKET,
-        };
-        self.all.install(|| shot::draw(shot)).0
-    }
-
-    /// Median milliseconds and hash of the renderer's own picture.
+    /// Median milliseconds and hash of the renderer's own picture with so many shadow rays.
     fn measure_product(
         &self,
         scenery: &Scenery<'_>,
-        lights: &Lights,
-        shadow_rays: u32,
+        (lights, shadow_rays): (&Lights, u32),
+        primary: Primary,
     ) -> (f64, String) {
-        let drawn = self.product(scenery, lights, shadow_rays);
-        let time = |_| timed(|| self.product(scenery, lights, shadow_rays)).0;
-        (median((0..self.frames).map(time).collect()), hash(self.size, &drawn))
+        let mut lights = *lights;
+        lights.key.shadow_rays = shadow_rays;
+        let shot = Shot {
+            rays: scenery.rays,
+            spheres: scenery.built.spheres(),
+            paint: &White,
+            lights: &lights,
+            samples: 1,
+            primary,
+            packet: PACKET,
+        };
+        let studio = Studio::new(self.size);
+        let draw = || self.all.install(|| studio.draw(shot));
+        draw();
+        let times = (0..self.frames).map(|_| timed(draw).0).collect();
+        (median(times), studio.hash())
     }
 
     /// Table 8.
     fn shadows(&self, scenery: &Scenery<'_>, table: &mut Table) -> Result<()> {
         let lights = large_light(scenery.loaded)?;
-        let all: Vec<_> =
-            [0, 4, 16, 64].map(|rays| self.measure_product(scenery, &lights, rays)).into();
+        let all: Vec<_> = [0, 4, 16, 64]
+            .map(|rays| self.measure_product(scenery, (&lights, rays), Primary::Trace))
+            .into();
         let cells = all.iter().map(|(ms, _)| Cell::Frame(*ms)).collect();
         table.push(scenery.loaded.label(), cells, all.into_iter().map(|(_, hash)| hash));
         Ok(())
@@ -319,7 +317,8 @@ impl Bench {
         let single = SingleRay { grid: &grid, level: self.level };
         let shot = self.shot(scenery.rays, PACKET);
         let all = self.measure(&self.all, &[(shot, &center), (shot, &single)]);
-        let (motes, _) = self.measure_product(scenery, &large_light(scenery.loaded)?, 0);
+        let light = large_light(scenery.loaded)?;
+        let (motes, _) = self.measure_product(scenery, (&light, 0), Primary::Project);
         let [cgt, single] = [Cell::Frame(all[0].0), Cell::Frame(all[1].0)];
         let cells = vec![cgt, single, Cell::Missing, Cell::Frame(motes)];
         table.push(scenery.loaded.label(), cells, self.hashes(&all));

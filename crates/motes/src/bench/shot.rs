@@ -1,10 +1,11 @@
-//! A picture by the product's own way: the one place where the benches call its renderer.
+//! Pictures by the product's own way: the one place where the benches call its renderer.
+
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use fearless_simd::Level;
 use glam::Vec3;
-use motes_scene::{Lights, Rays};
-use motes_spheres::{Counts, Paint, Settings, Spheres, View};
-use rayon::prelude::*;
+use motes_scene::{Lights, Primary, Rays};
+use motes_spheres::{Counts, Paint, Renderer, Settings, Sink, Spheres, Tile, View};
 
 /// What is drawn, and how.
 #[derive(Clone, Copy)]
@@ -13,38 +14,75 @@ pub(super) struct Shot<'a> {
     pub spheres: Spheres<'a>,
     pub paint: &'a dyn Paint,
     pub lights: &'a Lights,
-    pub size: (u32, u32),
     pub samples: u32,
+    pub primary: Primary,
     pub packet: u32,
 }
 
-/// One colour for all.
-pub(super) struct OneColor(pub Vec3);
+/// White.
+pub(super) struct White;
 
-impl Paint for OneColor {
+impl Paint for White {
     fn color(&self, _: u16, _: u32) -> Vec3 {
-        self.0
+        Vec3::ONE
+    }
+
+    fn uniform(&self, _: u16) -> Option<Vec3> {
+        Some(Vec3::ONE)
     }
 }
 
-/// The way to what the eye sees first.
-pub(super) const PRIMARY: &str = "trace";
+/// A renderer and its picture, kept from frame to frame: packed RGBA before a dark background.
+pub(super) struct Studio {
+    renderer: Renderer,
+    size: (u32, u32),
+    pixels: Vec<AtomicU32>,
+}
 
-/// Draws a picture: packed RGBA before a dark background, row by row, and counts of work.
-pub(super) fn draw(shot: Shot<'_>) -> (Vec<u32>, Counts) {
-    let Shot { rays, paint, lights, .. } = shot;
-    let systems = [shot.spheres];
-    let view = View { rays, systems: &systems, paint, lights };
-    let settings = Settings {
-        size: shot.size,
-        samples: shot.samples,
-        packet: shot.packet,
-        layers: false,
-        level: Level::new(),
-    };
-    match motes_spheres::render(view, settings, &|_, _| true) {
-        Some(picture) => (picture.color.par_iter().map(pack).collect(), picture.counts),
-        None => (Vec::new(), Counts::default()),
+impl Studio {
+    pub fn new(size: (u32, u32)) -> Self {
+        let pixels = size.0 as usize * size.1 as usize;
+        let pixels = std::iter::repeat_with(AtomicU32::default).take(pixels).collect();
+        Self { renderer: Renderer::new(), size, pixels }
+    }
+
+    /// Draws a picture in place of the last; gives counts of work.
+    pub fn draw(&self, shot: Shot<'_>) -> Counts {
+        let Shot { rays, paint, lights, .. } = shot;
+        let systems = [shot.spheres];
+        let view = View { rays, systems: &systems, paint, lights };
+        let settings = Settings {
+            size: self.size,
+            samples: shot.samples,
+            primary: match shot.primary {
+                Primary::Project => motes_spheres::Primary::Project,
+                Primary::Trace => motes_spheres::Primary::Trace,
+            },
+            packet: shot.packet,
+            layers: false,
+            level: Level::new(),
+        };
+        self.renderer.render(view, settings, self).unwrap_or_default()
+    }
+
+    /// The hash of the last picture.
+    pub fn hash(&self) -> String {
+        let pixels: Vec<u32> = self.pixels.iter().map(|p| p.load(Ordering::Relaxed)).collect();
+        super::hash(self.size, &pixels)
+    }
+}
+
+impl Sink for Studio {
+    fn tile(&self, tile: &Tile<'_>) -> bool {
+        let (x, y) = (tile.corner.0 as usize, tile.corner.1 as usize);
+        let (width, across) = (self.size.0 as usize, tile.size.0 as usize);
+        for (row, colors) in tile.color.chunks_exact(across).enumerate() {
+            let at = (y + row) * width + x;
+            for (pixel, color) in self.pixels[at..at + across].iter().zip(colors) {
+                pixel.store(pack(color), Ordering::Relaxed);
+            }
+        }
+        true
     }
 }
 

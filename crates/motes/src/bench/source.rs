@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use motes_particles::Particles;
-use motes_scene::{CameraView, Framing, Lights, RelativeTo, Scene};
+use motes_scene::{CameraView, Framing, Lights, Primary, RelativeTo, Scene};
 use motes_spheres::{Counts, Spheres};
 use serde::Serialize;
 
-use super::shot::{self, Shot};
-use super::{chosen, hash, median, pool, timed};
+use super::shot::{Shot, Studio};
+use super::{chosen, median, pool, timed};
 use crate::session::{instruction_set, wanted};
 use crate::system::{Loaded, visibility};
 use crate::{Error, Result, Watch, peak_memory_bytes, radius};
@@ -103,6 +103,7 @@ struct Bench {
     scene: Scene,
     particles: Arc<Particles>,
     frames: usize,
+    studio: Studio,
     line: Line,
 }
 
@@ -127,14 +128,18 @@ impl Bench {
             particles: 0,
             threads: rayon::current_num_threads(),
             simd: instruction_set(fearless_simd::Level::new()),
-            primary: shot::PRIMARY,
+            primary: match scene.spheres.primary {
+                Primary::Project => "project",
+                Primary::Trace => "trace",
+            },
             hash: String::new(),
             hashes: BTreeMap::new(),
             ms: BTreeMap::new(),
             bytes: BTreeMap::new(),
             counts: BTreeMap::new(),
         };
-        Ok(Self { scene, particles, frames: frames.max(1), line })
+        let studio = Studio::new((scene.image.width, scene.image.height));
+        Ok(Self { scene, particles, frames: frames.max(1), studio, line })
     }
 
     fn measure(&mut self, stages: &[&'static str], watch: &dyn Watch) -> Result<()> {
@@ -143,9 +148,8 @@ impl Bench {
         // The first of this process: nothing is warm yet.
         let (first_build, mut loaded) = self.build()?;
         let poses = self.poses(&loaded)?;
-        let (first_frame, (pixels, counts)) = timed(|| self.draw(&loaded, &poses[0], (0, 0)));
-        self.line.hash = hash(self.size(), &pixels);
-        drop(pixels);
+        let (first_frame, counts) = timed(|| self.draw(&loaded, &poses[0], (0, 0)));
+        self.line.hash = self.studio.hash();
         self.count(&loaded, counts);
         for (done, stage) in stages.iter().enumerate() {
             watch.progress(stage, done as u64 + 1, total);
@@ -193,10 +197,6 @@ impl Bench {
         Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
     }
 
-    fn size(&self) -> (u32, u32) {
-        (self.scene.image.width, self.scene.image.height)
-    }
-
     fn origin(&self) -> DVec3 {
         DVec3::from_array(self.particles.origin)
     }
@@ -221,20 +221,20 @@ impl Bench {
     }
 
     /// Draws a frame with so many shadow and occlusion rays.
-    fn draw(&self, loaded: &Loaded, pose: &Pose, rays: (u32, u32)) -> (Vec<u32>, Counts) {
+    fn draw(&self, loaded: &Loaded, pose: &Pose, rays: (u32, u32)) -> Counts {
         let mut lights = pose.lights;
         (lights.key.shadow_rays, lights.occlusion_rays) = rays;
         if lights.key.shadow_rays == 0 {
             // Plain Lambert: only shadows show how large a light is.
             lights.key.cos_half_angle = 1.0;
         }
-        shot::draw(Shot {
+        self.studio.draw(Shot {
             rays: &pose.view.rays(self.origin()),
             spheres: Spheres { classes: &loaded.classes, visible: &loaded.visible },
             paint: &Colors(&loaded.paint),
             lights: &lights,
-            size: self.size(),
             samples: self.scene.image.samples,
+            primary: self.scene.spheres.primary,
             packet: self.scene.spheres.packet,
         })
     }
@@ -246,11 +246,10 @@ impl Bench {
         poses: &[Pose],
         (stage, rays): (&'static str, (u32, u32)),
     ) -> f64 {
-        let (pixels, _) = self.draw(loaded, &poses[0], rays);
+        self.draw(loaded, &poses[0], rays);
         if rays != (0, 0) {
-            self.line.hashes.insert(stage, hash(self.size(), &pixels));
+            self.line.hashes.insert(stage, self.studio.hash());
         }
-        drop(pixels);
         let time = |pose: &Pose| timed(|| self.draw(loaded, pose, rays)).0;
         median(poses.iter().skip(1).map(time).collect())
     }
@@ -278,5 +277,9 @@ struct Colors<'a>(&'a crate::paint::Paint);
 impl motes_spheres::Paint for Colors<'_> {
     fn color(&self, _: u16, index: u32) -> glam::Vec3 {
         self.0.color(index)
+    }
+
+    fn uniform(&self, _: u16) -> Option<glam::Vec3> {
+        self.0.uniform()
     }
 }

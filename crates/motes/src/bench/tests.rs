@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 use glam::Vec3;
-use motes_scene::{Projection, Rays, Scene};
+use motes_scene::{Primary, Projection, Rays, Scene};
 
 use super::draw::{Culling, Drawn, Shot, SphereCenter, Way, draw};
 use super::sets::{Built, SETS, params};
@@ -219,6 +219,9 @@ fn a_source_has_all_stages_and_one_picture_whatever_the_packets() {
     // Shadows and occlusion are to be seen.
     let [shadow, ao] = ["shadow16", "ao16"].map(|stage| &lines[0].hashes[stage]);
     assert!(shadow != ao && *shadow != lines[0].hash && *ao != lines[0].hash);
+    let traced = line(|scene| scene.spheres.primary = Primary::Trace);
+    assert_eq!((&traced.hash, &traced.hashes), (&lines[0].hash, &lines[0].hashes));
+    assert_eq!((lines[0].primary, traced.primary), ("project", "trace"));
     let moved = line(|scene| scene.camera.fov = 30.0);
     assert_ne!(moved.hash, lines[0].hash);
 }
