@@ -10,7 +10,7 @@ use super::values::{short, size, threads, whole};
 
 const EXAMPLES: &str = "\
 Examples:
-  motes bench spheres                                    the paper's tables (an hour, 8 GB)
+  motes bench spheres                                    the paper's tables: minutes and 4 GB
   motes bench spheres --scale 0.1 --stages table2,table4 some of them, on smaller sets
   motes bench spheres --source demo:dam:1e6 --peer-view --json";
 

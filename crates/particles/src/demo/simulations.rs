@@ -131,7 +131,8 @@ pub(super) fn torso(count: usize) -> Simulation {
     let from_middle = |p: P| [p[0] - 0.5 * SIZE[0], p[1] - 0.5 * SIZE[1]];
     // 1 at the skin, 0 in the middle; the shoulders slope.
     let depth = |p: P| {
-        let shoulder = (1.0 - 0.6 * ((p[2] - 0.75).max(0.0) / 0.25).min(1.0).powi(2)).sqrt();
+        let up = ((p[2] - 0.75).max(0.0) / 0.25).min(1.0);
+        let shoulder = (1.0 - 0.6 * up * up).sqrt();
         let [x, y] = from_middle(p);
         length([x / (0.5 * SIZE[0] * shoulder), y / (0.5 * SIZE[1] * shoulder), 0.0])
     };
@@ -150,7 +151,7 @@ pub(super) fn torso(count: usize) -> Simulation {
     };
     let value = |p: P| match depth(p) {
         d if spine(p) || ((0.66..0.72).contains(&d) && ribbed(p)) => 2.0 + p[2],
-        d if d < 0.573 => 1.0 + d,
+        d if d < 0.581 => 1.0 + d,
         d => d - 0.5,
     };
     let empty = |p: P| lung(p).min(channel(p));
