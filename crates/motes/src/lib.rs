@@ -12,6 +12,7 @@
 //! The command line (`main.rs`) is a user of this library like any other.
 
 mod annotate;
+pub mod bench;
 mod error;
 mod info;
 mod open;

@@ -334,7 +334,7 @@ fn milliseconds(since: Instant) -> f64 {
 }
 
 /// The columns that colours and radii need; all, where a property's name or an expression may mean any.
-fn wanted(system: &motes_scene::System) -> Wanted {
+pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     let by = match &system.color.by {
         ColorBy::Auto => vec![names::COLOR],
         ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
@@ -409,7 +409,8 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));
 }
 
-fn instruction_set(level: Level) -> &'static str {
+/// The name of an instruction set.
+pub(crate) fn instruction_set(level: Level) -> &'static str {
     match level {
         #[cfg(target_arch = "x86_64")]
         Level::Avx512(_) => "AVX-512",

@@ -77,7 +77,8 @@ impl Loaded {
     }
 }
 
-fn visibility(
+/// What the filters and the expression of a system let through.
+pub(crate) fn visibility(
     particles: &Particles,
     classes: &RadiusClasses,
     system: &System,

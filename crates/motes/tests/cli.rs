@@ -464,3 +464,65 @@ fn a_single_frame_stands_still_beside_a_series() {
     succeeds(&folder, &[&args[..], &["--size", "32x24", "--samples", "1"]].concat());
     assert!(folder.join("t_1.png").exists());
 }
+
+#[test]
+fn bench_prints_one_line_of_json_for_a_source() {
+    let folder = folder("bench");
+    let line = |more: &[&str]| -> Value {
+        let args =
+            ["bench", "spheres", "--source", "demo:dam:2000", "--size", "48x32", "--frames", "1"];
+        let text = succeeds(&folder, &[&args[..], &["--json"], more].concat());
+        assert_eq!(text.lines().count(), 1, "{text}");
+        serde_json::from_str(&text).unwrap()
+    };
+    let whole = line(&["--peer-view"]);
+    let stages = ["ao16", "build", "first_image", "frame", "shadow16"];
+    assert_eq!(whole["ms"].as_object().unwrap().keys().collect::<Vec<_>>(), stages);
+    assert!(stages.iter().all(|stage| whole["ms"][*stage].as_f64().unwrap() > 0.0));
+    assert_eq!((&whole["method"], &whole["source"]), (&"spheres".into(), &"demo:dam:2000".into()));
+    assert_eq!((&whole["particles"], &whole["bytes"]["input"]), (&2000.into(), &24000.into()));
+    assert!(whole["counts"]["tests"].as_u64().unwrap() > 0 && whole["threads"].is_u64());
+    assert_eq!(whole["hash"].as_str().unwrap().len(), 16);
+
+    // Packets change no picture, the camera does; only what was asked for is measured.
+    let some = ["--peer-view", "--stages", "frame", "--set", "spheres.packet=2"];
+    let packets = line(&some);
+    assert_eq!(packets["hash"], whole["hash"]);
+    assert_eq!(packets["ms"].as_object().unwrap().keys().collect::<Vec<_>>(), ["frame"]);
+    assert_ne!(line(&["--peer-view", "--stages", "frame", "--fov", "20"])["hash"], whole["hash"]);
+}
+
+#[test]
+fn bench_prints_the_papers_tables() {
+    let folder = folder("bench-tables");
+    let args = ["bench", "spheres", "--size", "32x32", "--frames", "1", "--scale", "1e-4"];
+    let text = succeeds(&folder, &[&args[..], &["--stages", "table2,table5"]].concat());
+    let names = ["Cylinder", "JP8", "Bullet", "Thunder", "Foam", "BulletTorso"];
+    let starts: Vec<_> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    let expected =
+        [&["table2:", "Dataset"], &names[..], &["table5:", "Dataset"], &names[..]].concat();
+    assert_eq!(starts, expected, "{text}");
+    let json = succeeds(&folder, &[&args[..], &["--stages", "table2", "--json"]].concat());
+    let tables: Value = serde_json::from_str(&json).unwrap();
+    let cell = &tables[0]["rows"][5]["values"][3];
+    let rate = 1e3 / cell["ms"].as_f64().unwrap();
+    assert!((cell["frames_per_second"].as_f64().unwrap() / rate - 1.0).abs() < 1e-9);
+    assert_eq!(tables[0]["columns"][3], "16 x 16");
+}
+
+#[test]
+fn bench_refuses_what_makes_no_sense() {
+    let folder = folder("bench-refusals");
+    for (args, word) in [
+        (&["spheres", "--stages", "table1"][..], "'table1'"),
+        (&["spheres", "--source", "demo:dam:9", "--stages", "table2"], "'table2'"),
+        (&["spheres", "--fov", "30"], "--fov"),
+        (&["spheres", "--scale", "0"], "--scale"),
+        (&["spheres", "--frames", "0"], "--frames"),
+        (&["spheres", "--peer-view"], "--source"),
+        (&["surface"], "not in this version"),
+    ] {
+        let said = fails(&folder, &[&["bench"], args].concat(), 2);
+        assert!(said.contains(word), "{args:?}: {said}");
+    }
+}

@@ -8,6 +8,7 @@
 //! | `dam` | 95 % a slab with a wavy surface, FCC, jitter 10 %; 5 % spray above it; in shuffled order |
 //! | `layers` | 24 sheets across x (Zirr & Dachsbacher 2015, Fig. 8 left) |
 //! | `checker` | a 3-D checkerboard of full and empty blocks (Fig. 8 right) |
+//! | `cylinder`, `jp8`, `bullet`, `thunder`, `foam`, `torso` | built like Gribble et al. 2007, Table 1, with a `Value` each: see `simulations.rs` |
 //!
 //! Random numbers come from a hash of the set's seed and the particle's number, so that particles
 //! can be made in any order; sine, logarithm and cube root are series here, as the platforms'
@@ -16,11 +17,12 @@
 mod lattice;
 mod maths;
 mod sheets;
+mod simulations;
 
 use rayon::prelude::*;
 
 use crate::read::{Progress, Reader, Wanted};
-use crate::{Particles, Place, Radius, ReadError, Result};
+use crate::{Column, Particles, Place, Radius, ReadError, Result, Values};
 use maths::{cube_root, uniform};
 
 /// Seed of the random set.
@@ -36,14 +38,26 @@ pub(crate) enum Kind {
     Dam,
     Layers,
     Checker,
+    Cylinder,
+    Jp8,
+    Bullet,
+    Thunder,
+    Foam,
+    Torso,
 }
 
-const KINDS: [(&str, Kind); 5] = [
+const KINDS: [(&str, Kind); 11] = [
     ("random", Kind::Random),
     ("packed", Kind::Packed),
     ("dam", Kind::Dam),
     ("layers", Kind::Layers),
     ("checker", Kind::Checker),
+    ("cylinder", Kind::Cylinder),
+    ("jp8", Kind::Jp8),
+    ("bullet", Kind::Bullet),
+    ("thunder", Kind::Thunder),
+    ("foam", Kind::Foam),
+    ("torso", Kind::Torso),
 ];
 
 /// A set and its number of particles.
@@ -82,16 +96,32 @@ impl Demo {
 
     /// Makes the particles.
     pub(crate) fn particles(self) -> Particles {
-        let (positions, radius) = match (self.kind, self.count) {
-            (_, 0) => (vec![], 0.0),
-            (Kind::Random, n) => random(n),
-            (Kind::Packed, n) => lattice::packed(n),
-            (Kind::Dam, n) => lattice::dam(n),
-            (Kind::Layers, n) => sheets::layers(n),
-            (Kind::Checker, n) => sheets::checker(n),
-        };
-        Particles { positions, radius: Radius::Uniform(radius), ..Particles::default() }
+        match (self.kind, self.count) {
+            (_, 0) => plain((vec![], 0.0)),
+            (Kind::Random, n) => plain(random(n)),
+            (Kind::Packed, n) => plain(lattice::packed(n)),
+            (Kind::Dam, n) => plain(lattice::dam(n)),
+            (Kind::Layers, n) => plain(sheets::layers(n)),
+            (Kind::Checker, n) => plain(sheets::checker(n)),
+            (Kind::Cylinder, n) => valued(simulations::cylinder(n)),
+            (Kind::Jp8, n) => valued(simulations::jp8(n)),
+            (Kind::Bullet, n) => valued(simulations::bullet(n)),
+            (Kind::Thunder, n) => valued(simulations::thunder(n)),
+            (Kind::Foam, n) => valued(simulations::foam(n)),
+            (Kind::Torso, n) => valued(simulations::torso(n)),
+        }
     }
+}
+
+/// Positions and a radius.
+fn plain((positions, radius): (Vec<[f32; 3]>, f32)) -> Particles {
+    Particles { positions, radius: Radius::Uniform(radius), ..Particles::default() }
+}
+
+/// Positions, a radius, and the column `Value`.
+fn valued(made: simulations::Simulation) -> Particles {
+    let columns = vec![Column::new("Value", 1, Values::F32(made.values))];
+    Particles { columns, ..plain((made.positions, made.radius)) }
 }
 
 /// Uniform in the unit cube, radius 0.3 N^(−1/3).

@@ -1,5 +1,6 @@
 //! The verbs, and how the command line speaks: results on stdout, everything else on stderr.
 
+mod bench;
 mod frames;
 mod info;
 mod meter;
@@ -47,6 +48,8 @@ enum Verb {
     Render(Box<render::Args>),
     /// Print the scene: every parameter, its default and its meaning
     Scene(scene::Args),
+    /// Measure: the papers' tables, or one source
+    Bench(Box<bench::Args>),
     /// Print a completion script for a shell
     #[command(
         after_help = "Example:\n  motes completions bash > ~/.local/share/bash-completion/completions/motes"
@@ -81,6 +84,7 @@ fn run(cli: Cli) -> Result<(), Failure> {
         Verb::Info(args) => info::run(&args, cli.talk),
         Verb::Render(args) => render::run(&args, cli.talk),
         Verb::Scene(args) => scene::run(&args),
+        Verb::Bench(args) => bench::run(&args, cli.talk),
         Verb::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "motes", &mut script);

@@ -76,24 +76,8 @@ struct Look {
     /// A colour: "white", "#fafbfc"
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
-    /// Where the camera stands
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    camera_position: Option<String>,
-    /// The point it looks at
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    camera_target: Option<String>,
-    /// What is up in the picture
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    camera_up: Option<String>,
-    /// Vertical field of view, degrees [default: 35]
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    fov: Option<String>,
-    /// perspective or orthographic
-    #[arg(long, value_name = "KIND")]
-    projection: Option<String>,
-    /// The world's upward axis: z, y or x [default: z]
-    #[arg(long, value_name = "AXIS")]
-    up: Option<String>,
+    #[command(flatten)]
+    camera: CameraFlags,
     /// One radius for all particles
     #[arg(long, value_name = "R", allow_hyphen_values = true)]
     radius: Option<String>,
@@ -112,6 +96,61 @@ struct Look {
     /// Show only particles such as 'Mass > 2'
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     r#where: Option<String>,
+}
+
+/// Where the camera stands and how it looks.
+#[derive(Debug, clap::Args)]
+pub(super) struct CameraFlags {
+    /// Where the camera stands
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    camera_position: Option<String>,
+    /// The point it looks at
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    camera_target: Option<String>,
+    /// What is up in the picture
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    camera_up: Option<String>,
+    /// Vertical field of view, degrees [default: 35]
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    fov: Option<String>,
+    /// perspective or orthographic
+    #[arg(long, value_name = "KIND")]
+    projection: Option<String>,
+    /// The world's upward axis: z, y or x [default: z]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<String>,
+}
+
+/// A flag, the path of its parameter, and its value if it was typed.
+pub(super) type Typed<'a> = (&'static str, &'static str, &'a Option<String>);
+
+impl CameraFlags {
+    /// Each flag and its parameter.
+    pub fn typed(&self) -> [Typed<'_>; 6] {
+        [
+            ("--camera-position", "camera.position", &self.camera_position),
+            ("--camera-target", "camera.target", &self.camera_target),
+            ("--camera-up", "camera.up", &self.camera_up),
+            ("--fov", "camera.fov", &self.fov),
+            ("--projection", "camera.projection", &self.projection),
+            ("--up", "camera.up_axis", &self.up),
+        ]
+    }
+
+    /// The first flag that was typed.
+    pub fn first(&self) -> Option<&'static str> {
+        self.typed().into_iter().find(|(_, _, value)| value.is_some()).map(|(flag, ..)| flag)
+    }
+}
+
+/// Sets the parameters of the flags that were typed.
+pub(super) fn set_flags(scene: &mut Scene, typed: &[Typed<'_>]) -> Result<(), Failure> {
+    for (flag, path, value) in typed {
+        if let Some(value) = value {
+            scene.set(path, value).map_err(|e| of_flag(flag, e))?;
+        }
+    }
+    Ok(())
 }
 
 /// What is drawn over the picture; each has its opposite.
@@ -258,12 +297,6 @@ impl Args {
             ("--samples", "image.samples", &samples),
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
-            ("--camera-position", "camera.position", &look.camera_position),
-            ("--camera-target", "camera.target", &look.camera_target),
-            ("--camera-up", "camera.up", &look.camera_up),
-            ("--fov", "camera.fov", &look.fov),
-            ("--projection", "camera.projection", &look.projection),
-            ("--up", "camera.up_axis", &look.up),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
             ("--color-by", "system.color.by", &look.color_by),
@@ -271,11 +304,8 @@ impl Args {
             ("--range", "system.color.range", &look.range),
             ("--where", "system.where", &look.r#where),
         ];
-        for (flag, path, value) in typed {
-            if let Some(value) = value {
-                scene.set(path, value).map_err(|e| of_flag(flag, e))?;
-            }
-        }
+        set_flags(scene, &typed)?;
+        set_flags(scene, &look.camera.typed())?;
         self.overlay.edit(scene)?;
         for assignment in &self.set {
             scene.set_text(assignment).map_err(|e| Failure::usage(format!("--set: {e}")))?;

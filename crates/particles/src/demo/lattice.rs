@@ -80,15 +80,15 @@ fn spray(i: u64) -> [f32; 3] {
 
 /// Where lattice points are tried.
 #[derive(Clone, Copy)]
-struct Lattice {
+pub(super) struct Lattice {
     /// Edge of the cubic cell.
-    edge: f64,
+    pub edge: f64,
     /// The corner's three coordinates.
-    low: f64,
-    extent: [f64; 3],
+    pub low: f64,
+    pub extent: [f64; 3],
     /// Standard deviation from the lattice's place, in radii.
-    jitter: f64,
-    seed: u64,
+    pub jitter: f64,
+    pub seed: u64,
 }
 
 impl Lattice {
@@ -98,7 +98,7 @@ impl Lattice {
     }
 
     /// At least `count` points that are `inside`, and their radius; the edge shrinks until they fit.
-    fn at_least(
+    pub fn at_least(
         mut self,
         count: usize,
         inside: &(impl Fn(&[f32; 3]) -> bool + Sync),
@@ -134,7 +134,7 @@ impl Lattice {
 }
 
 /// The `count` points of least `key`, in their order; of equal ones the earlier.
-fn least(
+pub(super) fn least(
     mut points: Vec<[f32; 3]>,
     count: usize,
     key: &(impl Fn(&[f32; 3]) -> f64 + Sync),

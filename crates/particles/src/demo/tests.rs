@@ -63,14 +63,19 @@ fn hash(particles: &Particles) -> u64 {
 /// These are part of what users rely on: pictures of demo sets in documents and benches.
 #[test]
 fn bits_never_change() {
-    let texts = ["random:20000", "packed:20000", "dam:20000", "layers:20000", "checker:20000"];
-    let hashes = texts.map(|text| format!("{:016x}", hash(&demo(text))));
+    let hashes = KINDS.map(|(kind, _)| format!("{:016x}", hash(&demo(&format!("{kind}:20000")))));
     let expected = [
         "ce2222fed2c522d6",
         "b3d0e3f8f0760ecb",
         "0be421d6291fc179",
         "3ac5634957e9687b",
         "936fd6ce885feacd",
+        "85393364cc4a8e5e",
+        "f89a7719567b44fd",
+        "53a6bc7d1bebe6c7",
+        "a681e89392aeb9fb",
+        "9385e6609f2d5a16",
+        "3bdfae49153d81ec",
     ];
     assert_eq!(hashes, expected);
 }
@@ -150,4 +155,41 @@ fn checker_leaves_every_other_block_empty() {
         assert_eq!(*count, if full { 1000 } else { 0 }, "block {i}");
     }
     assert!(radius(&particles) > 0.0125 * 0.75f32.sqrt());
+}
+
+/// The part of the particles with a value in `range`.
+fn part(particles: &Particles, range: std::ops::Range<f64>) -> f64 {
+    let column = particles.column("Value").unwrap_or_else(|| panic!("no values"));
+    let all = particles.len();
+    (0..all).filter(|i| range.contains(&column.number(*i, 0))).count() as f64 / all as f64
+}
+
+#[test]
+fn simulations_have_the_parts_of_the_papers_table_7() {
+    let (thunder, torso) = (demo("thunder:30000"), demo("torso:200000"));
+    assert!((part(&thunder, 0.0..1.0) - 0.43).abs() < 1e-4);
+    let inner = part(&torso, 1.0..4.0);
+    assert!((inner - 0.3417).abs() < 0.01, "{inner}");
+    let bone = part(&torso, 2.0..4.0);
+    assert!(bone > 0.02 && bone < 0.5 * inner, "{bone}");
+}
+
+#[test]
+fn simulations_are_solids_of_touching_spheres_with_voids() {
+    for (kind, least, most) in
+        [("cylinder", 0.58, 0.7), ("jp8", 0.2, 0.4), ("foam", 0.15, 0.4), ("torso", 0.4, 0.75)]
+    {
+        let particles = demo(&format!("{kind}:50000"));
+        let (low, high) = particles.bounds().unwrap_or_else(|| panic!("{kind}: empty"));
+        let space: f64 = (0..3).map(|i| high[i] - low[i]).product();
+        let one = 4.0 / 3.0 * std::f64::consts::PI * f64::from(radius(&particles)).powi(3);
+        // The close packing fills 0.74 of the solid.
+        let filled = 50_000.0 * one / 0.7405 / space;
+        assert!((least..most).contains(&filled), "{kind}: {filled}");
+        let values = particles.column("Value").map(|c| c.range());
+        assert!(
+            values.is_some_and(|v| v[0].is_some_and(|(a, b)| a >= 0.0 && b > a + 0.3)),
+            "{kind}"
+        );
+    }
 }

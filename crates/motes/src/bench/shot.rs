@@ -1,0 +1,131 @@
+//! Pictures by the product's own way: the one place where the benches call its renderer.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fearless_simd::Level;
+use glam::Vec3;
+use motes_scene::{Lights, Primary, Rays};
+use motes_spheres::{Counts, Paint, Renderer, Settings, Sink, Spheres, Tile, View};
+
+/// What is drawn, and how.
+#[derive(Clone, Copy)]
+pub(super) struct Shot<'a> {
+    pub rays: &'a Rays,
+    pub spheres: Spheres<'a>,
+    pub paint: &'a dyn Paint,
+    pub lights: &'a Lights,
+    pub samples: u32,
+    pub primary: Primary,
+    pub packet: u32,
+}
+
+/// White.
+pub(super) struct White;
+
+impl Paint for White {
+    fn color(&self, _: u16, _: u32) -> Vec3 {
+        Vec3::ONE
+    }
+
+    fn uniform(&self, _: u16) -> Option<Vec3> {
+        Some(Vec3::ONE)
+    }
+}
+
+/// A renderer and its last picture, whose memory is kept from frame to frame.
+pub(super) struct Studio {
+    renderer: Renderer,
+    size: (u32, u32),
+    finished: Mutex<Vec<Part>>,
+    spare: Mutex<Vec<Part>>,
+}
+
+/// A tile of the picture: packed RGBA before a dark background.
+#[derive(Default)]
+struct Part {
+    corner: (u32, u32),
+    width: u32,
+    pixels: Vec<u32>,
+}
+
+/// Parts are pushed and popped whole: what a panic elsewhere left is as good.
+fn lock(parts: &Mutex<Vec<Part>>) -> MutexGuard<'_, Vec<Part>> {
+    parts.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Studio {
+    pub fn new(size: (u32, u32)) -> Self {
+        let (finished, spare) = (Mutex::default(), Mutex::default());
+        Self { renderer: Renderer::new(), size, finished, spare }
+    }
+
+    /// Draws a picture in place of the last; gives counts of work.
+    pub fn draw(&self, shot: Shot<'_>) -> Counts {
+        let Shot { rays, paint, lights, .. } = shot;
+        let systems = [shot.spheres];
+        let view = View { rays, systems: &systems, paint, lights };
+        let settings = Settings {
+            size: self.size,
+            samples: shot.samples,
+            primary: match shot.primary {
+                Primary::Project => motes_spheres::Primary::Project,
+                Primary::Trace => motes_spheres::Primary::Trace,
+            },
+            packet: shot.packet,
+            layers: false,
+            level: Level::new(),
+        };
+        lock(&self.spare).append(&mut lock(&self.finished));
+        self.renderer.render(view, settings, self).unwrap_or_default()
+    }
+
+    /// The hash of the last picture.
+    pub fn hash(&self) -> String {
+        let width = self.size.0 as usize;
+        let mut pixels = vec![0; width * self.size.1 as usize];
+        for part in lock(&self.finished).iter() {
+            let across = part.width as usize;
+            for (row, from) in part.pixels.chunks_exact(across.max(1)).enumerate() {
+                let at = (part.corner.1 as usize + row) * width + part.corner.0 as usize;
+                pixels[at..at + across].copy_from_slice(from);
+            }
+        }
+        super::hash(self.size, &pixels)
+    }
+}
+
+impl Sink for Studio {
+    fn tile(&self, tile: &Tile<'_>) -> bool {
+        let mut part = lock(&self.spare).pop().unwrap_or_default();
+        (part.corner, part.width) = (tile.corner, tile.size.0);
+        part.pixels.clear();
+        part.pixels.extend(tile.color.iter().map(pack));
+        lock(&self.finished).push(part);
+        true
+    }
+}
+
+/// Linear, premultiplied RGBA before a dark background, as bytes: R in the lowest.
+fn pack(color: &[f32; 4]) -> u32 {
+    const BEHIND: f32 = 32.0 / 255.0;
+    /// In f32 beside this number, the last eight bits count ones.
+    const WHOLE: f32 = 8_388_608.0;
+    let behind = (1.0 - color[3]) * BEHIND;
+    let [r, g, b, _] = color.map(|v| {
+        let byte = 255.0 * (v + behind).clamp(0.0, 1.0);
+        (byte + WHOLE).to_bits() & 0xff
+    });
+    0xff00_0000 | b << 16 | g << 8 | r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_are_packed_before_the_background() {
+        assert_eq!(pack(&[1.0, 0.5, 0.0, 1.0]), 0xff00_80ff);
+        assert_eq!(pack(&[0.0; 4]), 0xff20_2020);
+        assert_eq!(pack(&[9.0, -1.0, 0.25, 1.0]), 0xff40_00ff);
+    }
+}

@@ -1,0 +1,165 @@
+//! `motes bench`: the papers' tables, or one line for a source.
+
+use motes::bench::{Line, Source, Table, Tables, peer_view, spheres_source, spheres_tables};
+use motes::{Error, Scene};
+
+use super::meter::Meter;
+use super::render::{CameraFlags, set_flags};
+use super::talk::{Failure, Talk, print};
+use super::values::{short, size, threads, whole};
+
+const EXAMPLES: &str = "\
+Examples:
+  motes bench spheres                                    the paper's tables: minutes and 4 GB
+  motes bench spheres --scale 0.1 --stages table2,table4 some of them, on smaller sets
+  motes bench spheres --source demo:dam:1e6 --peer-view --json";
+
+/// As typed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
+pub(crate) struct Args {
+    /// The way of seeing: spheres
+    #[arg(value_name = "METHOD", hide_possible_values = true)]
+    method: Method,
+    /// Measure this source; without it, the paper's sets
+    #[arg(long, value_name = "SOURCE")]
+    source: Option<String>,
+    /// Pixels, or 720p, 1080p, 1440p, 4k, 8k [default: 1024x1024]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Frames of which the median counts
+    #[arg(long, value_name = "N", value_parser = whole, default_value = "5")]
+    frames: u32,
+    /// Tables or stages, with commas [default: all]
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    stages: Vec<String>,
+    /// Factor on the particles of the paper's sets
+    #[arg(long, value_name = "S", conflicts_with = "source")]
+    scale: Option<f64>,
+    /// Threads [default: all]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    threads: Option<usize>,
+    /// The camera and light of the programs compared with
+    #[arg(long, requires = "source")]
+    peer_view: bool,
+    #[command(flatten)]
+    camera: CameraFlags,
+    /// Any parameter that `motes scene` prints
+    #[arg(long, value_name = "PATH=VALUE", requires = "source")]
+    set: Vec<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
+enum Method {
+    Spheres,
+    #[value(hide = true)]
+    Surface,
+    #[value(hide = true)]
+    Density,
+    #[value(hide = true)]
+    Sections,
+}
+
+/// Pixels along the sides of a picture where nothing is said: the paper's (§5).
+const SIDE: u32 = 1024;
+
+pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
+    if args.method != Method::Spheres {
+        let name = format!("{:?}", args.method).to_lowercase();
+        return Err(Failure::usage(format!("bench {name}: not in this version; there is spheres")));
+    }
+    if args.frames == 0 {
+        return Err(Failure::usage("--frames 0: expected 1 or more"));
+    }
+    let meter = Meter::new(talk);
+    let text = match &args.source {
+        Some(source) => {
+            let options = Source {
+                scene: args.scene(source)?,
+                frames: args.frames as usize,
+                stages: args.stages.clone(),
+                threads: args.threads,
+            };
+            let line = spheres_source(options, &meter)?;
+            if args.json { json(&line)? } else { one_line(&line) }
+        }
+        None => {
+            let tables = spheres_tables(&args.tables()?, &meter)?;
+            let text = || tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n");
+            if args.json { json(&tables)? } else { text() }
+        }
+    };
+    drop(meter);
+    print(text.as_bytes())
+}
+
+impl Args {
+    /// What the tables are made with.
+    fn tables(&self) -> Result<Tables, Failure> {
+        if let Some(flag) = self.camera.first() {
+            return Err(Failure::usage(format!(
+                "{flag}: needs --source; the tables have own views"
+            )));
+        }
+        let scale = self.scale.unwrap_or(1.0);
+        if !(scale > 0.0 && scale <= 10.0) {
+            return Err(Failure::usage(format!("--scale {scale}: expected above 0, at most 10")));
+        }
+        let [width, height] = self.size.unwrap_or([SIDE; 2]);
+        // Table 3 doubles it, and no scene has more pixels than it can have.
+        let mut scene = Scene::default();
+        (scene.image.width, scene.image.height) =
+            (width.saturating_mul(2), height.saturating_mul(2));
+        scene.check().map_err(|e| Failure::usage(format!("--size, twice: {e}")))?;
+        Ok(Tables {
+            size: (width, height),
+            frames: self.frames as usize,
+            stages: self.stages.clone(),
+            scale,
+            threads: self.threads,
+        })
+    }
+
+    /// The scene of a source: one sample per pixel, then what was typed.
+    fn scene(&self, source: &str) -> Result<Scene, Failure> {
+        let mut scene = Scene::default();
+        scene.set_sources(&[source.into()]);
+        [scene.image.width, scene.image.height] = self.size.unwrap_or([SIDE; 2]);
+        scene.image.samples = 1;
+        if self.peer_view {
+            peer_view(&mut scene);
+        }
+        set_flags(&mut scene, &self.camera.typed())?;
+        for assignment in &self.set {
+            scene.set_text(assignment).map_err(|e| Failure::usage(format!("--set: {e}")))?;
+        }
+        scene.check().map_err(Error::from)?;
+        Ok(scene)
+    }
+}
+
+fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string(value).map(|text| text + "\n").map_err(Failure::data)
+}
+
+/// A line for people.
+fn one_line(line: &Line) -> String {
+    let ms: Vec<_> = line.ms.iter().map(|(name, ms)| format!("{name} {} ms", short(*ms))).collect();
+    let bytes = |name| line.bytes.get(name).copied().unwrap_or(0) as f64 / f64::from(1 << 20);
+    format!(
+        "{}: {} particles, {} threads, {}, {}: {}; {:.1} MiB + {:.1} MiB for {:.1} MiB of input; {}\n",
+        line.source,
+        line.particles,
+        line.threads,
+        line.simd,
+        line.primary,
+        ms.join(", "),
+        bytes("data"),
+        bytes("grid") + bytes("visibility"),
+        bytes("input"),
+        line.hash
+    )
+}
