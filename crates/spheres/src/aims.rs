@@ -1,9 +1,12 @@
 //! Where secondary rays go: the same for a whole picture.
 
+use fearless_simd::{f32x16, prelude::*};
 use glam::Vec3;
 use motes_scene::Lights;
 
+use crate::lanes::Lanes;
 use crate::near::Shelves;
+use crate::packet::LANES;
 use crate::shaft::Cone;
 use crate::traverse::Spheres;
 
@@ -17,6 +20,8 @@ pub(crate) struct Aims {
     samples: u32,
     /// Towards the key light: for each turn and each sample, its rays.
     key: Vec<Vec3>,
+    /// The same, coordinate by coordinate.
+    key_rows: [Lanes<f32>; 3],
     /// Shadow rays of a sample.
     pub key_rays: usize,
     /// The cone around them.
@@ -45,6 +50,12 @@ impl Aims {
                 }
             }
         }
+        let mut key_rows = [(); 3].map(|()| Lanes::new(0.0, key.len().next_multiple_of(LANES)));
+        for (place, direction) in key.iter().enumerate() {
+            for axis in 0..3 {
+                key_rows[axis][place] = direction[axis];
+            }
+        }
         let key_cone = Cone::around(&key);
         let fill_rays = 2 * lights.occlusion_rays;
         let mut fill = Vec::new();
@@ -58,6 +69,7 @@ impl Aims {
         }
         Self {
             samples,
+            key_rows,
             key,
             key_rays: key_rays as usize,
             key_cone,
@@ -72,6 +84,24 @@ impl Aims {
     #[inline(always)]
     pub fn key_set(&self, turn: u32, sample: u32) -> usize {
         (turn * self.samples + sample) as usize * self.key_rays
+    }
+
+    /// Whether the rays of a set come in whole sixteens.
+    #[inline(always)]
+    pub fn key_whole(&self) -> bool {
+        self.key_rays.is_multiple_of(LANES)
+    }
+
+    /// Sixteen key directions from a place on, coordinate by coordinate.
+    #[inline(always)]
+    pub fn key_sixteen<S: Simd>(&self, simd: S, place: usize) -> [f32x16<S>; 3] {
+        let [x, y, z] = &self.key_rows;
+        let lanes = place..place + LANES;
+        [
+            f32x16::from_slice(simd, &x[lanes.clone()]),
+            f32x16::from_slice(simd, &y[lanes.clone()]),
+            f32x16::from_slice(simd, &z[lanes]),
+        ]
     }
 
     /// A key direction by its place.

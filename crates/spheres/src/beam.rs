@@ -19,7 +19,9 @@ use crate::shaft::{LOST, blocks};
 use crate::traverse::{Counts, Spheres};
 
 /// Most rays of a beam.
-pub(crate) const MOST: usize = 512;
+pub(crate) const MOST: usize = 1024;
+/// Beams of more vectors than this look at the bounds of each vector before they test its rays.
+const FEW: usize = 2;
 
 /// Parallel rays, all of the same reach.
 #[derive(Debug)]
@@ -29,6 +31,10 @@ pub(crate) struct Beam {
     pub origin: [Lanes<f32>; 3],
     /// How far each ray looks; [`LOST`] once it is blocked.
     reach: Lanes<f32>,
+    /// Least and greatest u′ and v′ of each vector of sixteen rays; of what is no vector, bounds that
+    /// nothing lies in.
+    low: [Lanes<f32>; 2],
+    high: [Lanes<f32>; 2],
 }
 
 /// The shape of a beam: constants for sixteen boxes or spheres at a time.
@@ -56,7 +62,14 @@ struct Shape {
 impl Beam {
     pub fn new() -> Self {
         let zeros = || [(); 3].map(|()| Lanes::new(0.0, MOST + LANES));
-        Self { rays: 0, origin: zeros(), reach: Lanes::new(LOST, MOST + LANES) }
+        let bounds = |value| [(); 2].map(|()| Lanes::new(value, MOST / LANES + LANES));
+        Self {
+            rays: 0,
+            origin: zeros(),
+            reach: Lanes::new(LOST, MOST + LANES),
+            low: bounds(f32::INFINITY),
+            high: bounds(f32::NEG_INFINITY),
+        }
     }
 
     /// Which of the sixteen rays from `first` on are open.
@@ -112,7 +125,7 @@ impl Beam {
     }
 
     #[inline(always)]
-    fn shape<S: Simd>(&self, simd: S, direction: Vec3, reach: f32) -> Shape {
+    fn shape<S: Simd>(&mut self, simd: S, direction: Vec3, reach: f32) -> Shape {
         let k = direction.abs().max_position();
         let axes = [k, (k + 1) % 3, (k + 2) % 3];
         let sign = direction[k].signum();
@@ -127,10 +140,19 @@ impl Beam {
             for side in 0..2 {
                 let across = load(simd, &self.origin[axes[side + 1]], first);
                 let sheared = across - (along - from) * slope[side];
-                low[side] = low[side].min(sheared.reduce_min());
-                high[side] = high[side].max(sheared.reduce_max());
+                let vector = first / LANES;
+                self.low[side][vector] = sheared.reduce_min();
+                self.high[side][vector] = sheared.reduce_max();
+                low[side] = low[side].min(self.low[side][vector]);
+                high[side] = high[side].max(self.high[side][vector]);
                 size = size.max(across.abs().reduce_max());
             }
+        }
+        let vectors = self.rays.div_ceil(LANES);
+        for side in 0..2 {
+            let rest = vectors..vectors.next_multiple_of(LANES);
+            self.low[side][rest.clone()].fill(f32::INFINITY);
+            self.high[side][rest].fill(f32::NEG_INFINITY);
         }
         let (start, last) = if sign > 0.0 { (k0, k1) } else { (-k1, -k0) };
         let pad = (size + k0.abs().max(k1.abs()) + reach) * 4e-6;
@@ -172,7 +194,7 @@ impl Beam {
                 let place = slot + may.trailing_zeros() as usize;
                 may &= may - 1;
                 let (center, radius) = (grid.center(place), grid.radius_at(place));
-                self.test(simd, (center, radius), direction, (live, counts));
+                self.test(simd, (center, radius), (shape, direction), (live, counts));
                 if *live == 0 {
                     return;
                 }
@@ -187,31 +209,71 @@ impl Beam {
         &mut self,
         simd: S,
         (center, radius): (Vec3, f32),
-        direction: Vec3,
+        (shape, direction): (&Shape, Vec3),
         (live, counts): (&mut usize, &mut Counts),
     ) {
-        let lost = f32x16::splat(simd, LOST);
-        for first in (0..self.rays).step_by(LANES) {
-            let reach = load(simd, &self.reach, first);
-            let oc = [
-                f32x16::splat(simd, center.x) - load(simd, &self.origin[0], first),
-                f32x16::splat(simd, center.y) - load(simd, &self.origin[1], first),
-                f32x16::splat(simd, center.z) - load(simd, &self.origin[2], first),
-            ];
-            let d = [
-                f32x16::splat(simd, direction.x),
-                f32x16::splat(simd, direction.y),
-                f32x16::splat(simd, direction.z),
-            ];
-            counts.tests += LANES as u64;
-            let blocked = blocks(simd, oc, d, (radius, reach));
-            if blocked.any_true() {
-                let left = blocked.select(lost, reach);
-                left.store_slice(&mut self.reach[first..first + LANES]);
-                // A vector that was lost before is not blocked again.
-                *live -= usize::from(!left.simd_gt(lost).any_true());
+        let vectors = self.rays.div_ceil(LANES);
+        if vectors <= FEW {
+            for vector in 0..vectors {
+                counts.tests += LANES as u64;
+                *live -= self.test_vector(simd, (center, radius), direction, vector);
+            }
+            return;
+        }
+        let along = center[shape.axes[0]] - shape.k;
+        let u = center[shape.axes[1]] - along * shape.slope[0];
+        let v = center[shape.axes[2]] - along * shape.slope[1];
+        let shift_u = (radius + shape.pad) * shape.widen[0];
+        let shift_v = (radius + shape.pad) * shape.widen[1];
+        for first in (0..vectors).step_by(LANES) {
+            let meets = load(simd, &self.low[0], first).simd_le(f32x16::splat(simd, u + shift_u))
+                & load(simd, &self.high[0], first).simd_ge(f32x16::splat(simd, u - shift_u))
+                & load(simd, &self.low[1], first).simd_le(f32x16::splat(simd, v + shift_v))
+                & load(simd, &self.high[1], first).simd_ge(f32x16::splat(simd, v - shift_v));
+            let mut meets = meets.to_bitmask();
+            while meets != 0 {
+                let vector = first + meets.trailing_zeros() as usize;
+                meets &= meets - 1;
+                counts.tests += LANES as u64;
+                *live -= self.test_vector(simd, (center, radius), direction, vector);
             }
         }
+    }
+
+    /// Tests a vector of rays against a sphere. Gives 1 if that blocked the last of them, else 0.
+    #[inline(always)]
+    fn test_vector<S: Simd>(
+        &mut self,
+        simd: S,
+        (center, radius): (Vec3, f32),
+        direction: Vec3,
+        vector: usize,
+    ) -> usize {
+        let first = vector * LANES;
+        let lost = f32x16::splat(simd, LOST);
+        let reach = load(simd, &self.reach, first);
+        let oc = [
+            f32x16::splat(simd, center.x) - load(simd, &self.origin[0], first),
+            f32x16::splat(simd, center.y) - load(simd, &self.origin[1], first),
+            f32x16::splat(simd, center.z) - load(simd, &self.origin[2], first),
+        ];
+        let d = [
+            f32x16::splat(simd, direction.x),
+            f32x16::splat(simd, direction.y),
+            f32x16::splat(simd, direction.z),
+        ];
+        let blocked = blocks(simd, oc, d, (radius, reach));
+        if !blocked.any_true() {
+            return 0;
+        }
+        let left = blocked.select(lost, reach);
+        left.store_slice(&mut self.reach[first..first + LANES]);
+        if left.simd_gt(lost).any_true() {
+            return 0;
+        }
+        // Nothing lies in the bounds of what is lost.
+        self.low[0][vector] = f32::INFINITY;
+        1
     }
 }
 

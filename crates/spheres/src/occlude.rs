@@ -8,8 +8,8 @@
 //!
 //! Ambient occlusion goes along directions that cut the sphere into parts of equal area, of which those
 //! above the surface count with the cosine. All rays of a bundle share one direction, so that it stays
-//! as narrow as its points lie together, however far it goes. Neighbouring pixels, two by two, have
-//! directions of their own (interleaved sampling, Keller and Heidrich 2001); hits on the same sphere
+//! as narrow as its points lie together, however far it goes. On all but small spheres, neighbouring
+//! pixels, two by two, have directions of their own (interleaved sampling, Keller and Heidrich 2001); hits on the same sphere
 //! within such a square share what they see.
 
 use fearless_simd::{f32x16, prelude::*, u32x16};
@@ -30,10 +30,13 @@ use crate::traverse::Counts;
 
 /// Edge of the cells that hits are sorted by, pixels at the least distance in the tile.
 const CELL_PIXELS: f32 = 4.0;
-/// Greatest edge of the box around a group, pixels at that distance.
-const GROUP_PIXELS: f32 = 16.0;
-/// Most hits of a group, for each sample of a pixel.
-const GROUP_POINTS: usize = 128;
+/// Greatest edge of the box around a group, pixels at that distance, and most hits of it for each sample
+/// of a pixel: for shadows and for occlusion.
+const SHADOW_GROUP: (f32, usize) = (16.0, 128);
+const OCCLUSION_GROUP: (f32, usize) = (32.0, 1024);
+
+/// Spheres of a lesser radius, in pixels, all look in the same directions.
+const SMALL_SPHERE: f32 = 5.0;
 
 /// The hits of a tile, and what they look at.
 #[derive(Clone, Copy)]
@@ -48,6 +51,24 @@ pub(crate) struct Work<'a> {
     pub first_sample: u32,
 }
 
+impl Work<'_> {
+    /// Which of the four sets of occlusion directions the hit of a ray has: by its place in a square of
+    /// two by two pixels, but on a sphere so small that no bands can show on it, and in a pixel with many
+    /// samples, always the first. One set for all keeps beams full.
+    #[inline(always)]
+    fn quarter(&self, ray: usize) -> u32 {
+        let pixel = match self.view.rays.projection {
+            Projection::Perspective => self.view.rays.pixel * self.rays.distance[ray],
+            Projection::Orthographic => self.view.rays.pixel,
+        };
+        if self.rays.pattern.side == 1 || self.hits.radius[ray] < SMALL_SPHERE * pixel {
+            return 0;
+        }
+        let (x, y) = self.rays.pattern.pixel_of(ray);
+        x % 2 + y % 2 * 2
+    }
+}
+
 /// Finds what reaches the hits of a tile, and keeps its buffers from one to the next.
 #[derive(Debug)]
 pub(crate) struct Occluder {
@@ -58,6 +79,8 @@ pub(crate) struct Occluder {
     /// The hits by place: a key of their cell, and their ray.
     order: Vec<(u32, u32)>,
     points: Points,
+    /// Cosines of the rays of a bundle.
+    cosine: Vec<f32>,
     /// Sums over each hit's rays, of visible · cosine and of cosine.
     key: Sums,
     fill: Sums,
@@ -85,6 +108,7 @@ impl Occluder {
             near: Near::default(),
             order: Vec::new(),
             points: Points::default(),
+            cosine: Vec::new(),
             key: Sums::new(),
             fill: Sums::new(),
         }
@@ -100,14 +124,15 @@ impl Occluder {
         }
         let pixel = self.sort(work);
         let mut rest = 0;
-        while rest < self.order.len() {
-            let (from, to) = (rest, self.group(work, (rest, GROUP_PIXELS * pixel)));
-            if shadows {
-                self.shadow(simd, work, (from, to), counts);
-            }
-            if occlusion {
-                self.occlude(simd, work, (from, to), counts);
-            }
+        while shadows && rest < self.order.len() {
+            let (from, to) = (rest, self.group(work, rest, (pixel, SHADOW_GROUP)));
+            self.shadow(simd, work, (from, to), counts);
+            rest = to;
+        }
+        let mut rest = 0;
+        while occlusion && rest < self.order.len() {
+            let (from, to) = (rest, self.group(work, rest, (pixel, OCCLUSION_GROUP)));
+            self.occlude(simd, work, (from, to), counts);
             rest = to;
         }
         if shadows {
@@ -171,8 +196,14 @@ impl Occluder {
     /// Where the group ends that begins at `from`: before its box grows longer than `most`, and before
     /// it has too many points.
     #[inline(always)]
-    fn group(&self, work: Work<'_>, (from, most): (usize, f32)) -> usize {
-        let points = (GROUP_POINTS * work.rays.pattern.samples as usize).min(MOST);
+    fn group(
+        &self,
+        work: Work<'_>,
+        from: usize,
+        (pixel, (edge, points)): (f32, (f32, usize)),
+    ) -> usize {
+        let points = points * work.rays.pattern.samples as usize;
+        let most = edge * pixel;
         let end = self.order.len().min(from + points);
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (at, (_, ray)) in self.order[from..end].iter().enumerate() {
@@ -201,7 +232,10 @@ impl Occluder {
         let Some(cone) = &work.aims.key_cone else { return };
         let rays = work.aims.key_rays;
         self.bundle.clear();
-        // Rays in vectors of sixteen, point by point.
+        self.points.pad();
+        self.points.clear_sums();
+        self.cosine.clear();
+        let whole = work.aims.key_whole();
         let mut staged = Staged::new();
         for point in 0..self.points.count {
             let (origin, normal) = self.points.get(point);
@@ -211,6 +245,13 @@ impl Occluder {
                 turn(work.corner.0 + x, work.corner.1 + y),
                 work.first_sample + work.rays.pattern.sample(ray),
             );
+            if whole {
+                for first in (first..first + rays).step_by(LANES) {
+                    let toward = work.aims.key_sixteen(simd, first);
+                    self.send(simd, (origin, normal), toward);
+                }
+                continue;
+            }
             for place in first..first + rays {
                 let direction = work.aims.key_direction(place);
                 let cosine = direction.dot(normal);
@@ -226,20 +267,60 @@ impl Occluder {
         let bounds = self.points.bounds(0, self.points.count);
         let systems = work.view.systems;
         self.bundle.block(simd, (cone, bounds, f32::INFINITY), systems, counts);
-        for (_, ray) in &self.order[from..to] {
-            self.key.visible[*ray as usize] = 0.0;
-            self.key.all[*ray as usize] = 0.0;
+        if whole {
+            let vectors = rays / LANES;
+            for point in 0..self.points.count {
+                for vector in point * vectors..(point + 1) * vectors {
+                    let lanes = vector * LANES..(vector + 1) * LANES;
+                    let cosine = f32x16::from_slice(simd, &self.cosine[lanes]);
+                    let zero = f32x16::splat(simd, 0.0);
+                    self.points.all[point] += cosine.reduce_sum();
+                    let open = self.bundle.open(simd, vector).select(cosine, zero);
+                    self.points.visible[point] += open.reduce_sum();
+                }
+            }
         }
         for (i, (cosine, point)) in staged.own.iter().enumerate() {
-            let ray = self.points.ray[*point as usize] as usize;
-            self.key.all[ray] += cosine;
+            self.points.all[*point as usize] += cosine;
             if self.bundle.is_open(i) {
-                self.key.visible[ray] += cosine;
+                self.points.visible[*point as usize] += cosine;
             }
+        }
+        for point in 0..self.points.count {
+            let ray = self.points.ray[point] as usize;
+            self.key.visible[ray] = self.points.visible[point];
+            self.key.all[ray] = self.points.all[point];
         }
     }
 
-    /// Occlusion rays from the points of a group: a bundle for each direction.
+    /// Sends sixteen rays of one point towards the light; those below its surface are none.
+    #[inline(always)]
+    fn send<S: Simd>(
+        &mut self,
+        simd: S,
+        (origin, normal): (Vec3, Vec3),
+        toward: [f32x16<S>; 3],
+    ) {
+        let [dx, dy, dz] = toward;
+        let zero = f32x16::splat(simd, 0.0);
+        let cosine = (dz * normal.z + dy * normal.y + dx * normal.x).max(zero);
+        let at = self.cosine.len();
+        self.cosine.resize(at + LANES, 0.0);
+        cosine.store_slice(&mut self.cosine[at..]);
+        let above = cosine.simd_gt(zero);
+        let reach =
+            above.select(f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, LOST));
+        let from = [
+            f32x16::splat(simd, origin.x),
+            f32x16::splat(simd, origin.y),
+            f32x16::splat(simd, origin.z),
+        ];
+        // A vector without rays meets nothing.
+        let spread = if above.any_true() { 0.0 } else { LOST };
+        self.bundle.push(from, toward, reach, (origin, spread));
+    }
+
+    /// Occlusion rays from the points of a group: a beam for each direction.
     #[inline(always)]
     fn occlude<S: Simd>(
         &mut self,
@@ -249,14 +330,8 @@ impl Occluder {
         counts: &mut Counts,
     ) {
         let (pattern, aims) = (work.rays.pattern, work.aims);
-        // Of a pixel with sixteen samples nothing is shared with neighbours.
-        let quarters = if pattern.side == 1 { 1 } else { 4 };
-        let classes = quarters * pattern.samples;
-        let class_of = |ray: u32| {
-            let (x, y) = pattern.pixel_of(ray as usize);
-            let quarter = if quarters == 1 { 0 } else { x % 2 + y % 2 * 2 };
-            quarter * pattern.samples + pattern.sample(ray as usize)
-        };
+        let classes = 4 * pattern.samples;
+        let class_of = |ray: u32| work.quarter(ray as usize) * pattern.samples + pattern.sample(ray as usize);
         let systems = work.view.systems;
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (_, ray) in &self.order[from..to] {

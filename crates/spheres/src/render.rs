@@ -165,6 +165,8 @@ struct Desk {
     hits: Hits,
     occluder: Occluder,
     color: Vec<[f32; 4]>,
+    /// Whether there is no light in `color`.
+    blank: bool,
     center: Vec<Center>,
 }
 
@@ -176,6 +178,7 @@ impl Desk {
             hits: Hits::new(),
             occluder: Occluder::new(),
             color: Vec::new(),
+            blank: true,
             center: Vec::new(),
         }
     }
@@ -257,8 +260,11 @@ impl<'a> Plan<'a> {
     fn area<S: Simd>(&self, simd: S, area: usize, desk: &mut Desk, counts: &mut Counts) {
         let place = self.place(area);
         let pixels = (place.size.0 * place.size.1) as usize;
-        desk.color.clear();
-        desk.color.resize(pixels, [0.0; 4]);
+        if !desk.blank || desk.color.len() != pixels {
+            desk.color.clear();
+            desk.color.resize(pixels, [0.0; 4]);
+            desk.blank = true;
+        }
         desk.center.clear();
         if self.settings.layers {
             desk.center.resize(pixels, Center::NOTHING);
@@ -329,6 +335,7 @@ impl<'a> Plan<'a> {
         desk: &mut Desk,
         counts: &mut Counts,
     ) {
+        desk.blank = false;
         let Desk { rays, hits, occluder, color, .. } = desk;
         let weight = 1.0 / self.settings.samples as f32;
         let work = Work {

@@ -196,6 +196,12 @@ impl Bundle {
         self.spread.resize(vectors, LOST);
     }
 
+    /// Which of the sixteen rays of vector `vector` are not blocked.
+    #[inline(always)]
+    pub fn open<S: Simd>(&self, simd: S, vector: usize) -> mask32x16<S> {
+        load(simd, &self.reach, vector * LANES).simd_gt(f32x16::splat(simd, LOST))
+    }
+
     /// Whether ray `ray`, counted through the vectors, is not blocked.
     #[inline(always)]
     pub fn is_open(&self, ray: usize) -> bool {
@@ -215,7 +221,11 @@ impl Bundle {
         // The unused bounds of the last sixteen meet nothing.
         let end = self.vectors.next_multiple_of(LANES).min(self.spread.len());
         self.spread[self.vectors..end].fill(LOST);
-        let mut live = self.vectors;
+        let spread = &self.spread[..self.vectors];
+        let mut live = spread.iter().filter(|spread| **spread > LOST).count();
+        if live == 0 {
+            return;
+        }
         for spheres in systems {
             for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
                 let bounds = (grid.low, grid.high, grid.greatest_radius);
