@@ -161,13 +161,13 @@ impl Light {
                 ..studio
             },
             Preset::Sun => Self {
-                direction: DVec3::new(-0.7, 0.8, 0.45),
-                color: Color::hex(0xfff1d6),
-                intensity: 1.0,
+                direction: DVec3::new(-0.8, 0.8, 0.5),
+                color: Color::hex(0xfff0d0),
+                intensity: 1.15,
                 softness: 1.0,
                 sky: Color::hex(0xbcd4ff),
                 ground: Color::hex(0xc8b49a),
-                fill: 0.34,
+                fill: 0.45,
                 ..studio
             },
             Preset::Overcast => Self {
