@@ -106,6 +106,46 @@ fn what_is_decoded_is_what_was_shown() {
     }
 }
 
+/// Pictures that share nothing with those before: noise, and full black after full white.
+#[test]
+fn pictures_that_cannot_be_foreseen_come_out_too() {
+    let here = folder("hostile");
+    let (width, height) = (70, 50);
+    let mut state = 1u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let v = (state >> 24) as u8;
+        [v, v, v, 255]
+    };
+    let pictures: Vec<Rgba8> = (0..12)
+        .map(|number| {
+            let pixels: Vec<[u8; 4]> = match number % 3 {
+                0 => (0..width * height).map(|_| noise()).collect(),
+                1 => vec![[255; 4]; width * height],
+                _ => vec![[0, 0, 0, 255]; width * height],
+            };
+            Rgba8 { width, height, pixels }
+        })
+        .collect();
+    // Mean squared errors of a quantiser's step of 2^((QP − 4)/6), about its square over 12, doubled
+    // for what quick decisions lose.
+    for (quality, most) in [(0, 6000.0), (50, 60.0), (100, 2.0)] {
+        let path = here.join(format!("{quality}.mp4"));
+        let size = (width as u32, height as u32);
+        let mut film = Film::create(&path, Settings { size, fps: 25.0, quality }).unwrap();
+        pictures.iter().for_each(|picture| film.add(picture.clone()).unwrap());
+        film.finish().unwrap();
+        let decoded = decode(&path);
+        assert_eq!(decoded.len(), pictures.len());
+        for (number, (picture, plane)) in pictures.iter().zip(&decoded).enumerate() {
+            let pairs = picture.pixels.iter().zip(plane);
+            let sum: f64 = pairs.map(|(p, y)| (luma(*p) - f64::from(*y)).powi(2)).sum();
+            let error = sum / plane.len() as f64;
+            assert!(error < most, "quality {quality}, picture {number}: {error}");
+        }
+    }
+}
+
 #[test]
 fn the_same_pictures_make_the_same_film() {
     let here = folder("same");
