@@ -294,12 +294,7 @@ impl Session {
             loaded.iter().map(|l| Spheres { classes: &l.classes, visible: &l.visible }).collect();
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
-        let view = View {
-            rays: &rays,
-            systems: &systems,
-            paint: &Paints(loaded),
-            lights: &lights,
-        };
+        let view = View { rays: &rays, systems: &systems, paint: &Paints(loaded), lights: &lights };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),
