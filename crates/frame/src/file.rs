@@ -6,27 +6,70 @@ use std::path::{Path, PathBuf};
 
 use crate::{FrameError, Result};
 
-/// Writes a file through `content`, under a temporary name beside `path` that becomes `path` at the end.
+/// A file that is being written under a temporary name beside its own. [`Unfinished::finish`] gives it
+/// its own; dropped before, it is gone.
 ///
-/// Whoever looks at `path` sees the old file or the whole new one; if anything fails, the old one stays.
+/// Whoever looks at the path sees the old file or the whole new one; if anything fails, the old one stays.
+#[derive(Debug)]
+pub struct Unfinished {
+    out: BufWriter<File>,
+    temporary: PathBuf,
+    path: PathBuf,
+}
+
+impl Unfinished {
+    /// Begins the file `path`.
+    ///
+    /// # Errors
+    /// Those of the file system, with the file's name.
+    pub fn create(path: &Path) -> Result<Self> {
+        let (file, temporary) = create_beside(path).map_err(|e| file_failed(path, e))?;
+        let out = BufWriter::with_capacity(1 << 20, file);
+        Ok(Self { out, temporary, path: path.into() })
+    }
+
+    /// Where its content goes.
+    pub fn out(&mut self) -> &mut BufWriter<File> {
+        &mut self.out
+    }
+
+    /// The name it will have.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives it its name.
+    ///
+    /// # Errors
+    /// Those of the file system, with the file's name.
+    pub fn finish(mut self) -> Result<()> {
+        let flushed = self.out.flush();
+        let named = flushed.and_then(|()| fs::rename(&self.temporary, &self.path));
+        named.map_err(|e| file_failed(&self.path, e))
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        // Once it has its name there is nothing here; and the first error is the one to tell.
+        let _ = fs::remove_file(&self.temporary);
+    }
+}
+
+/// Writes a file through `content`, as an [`Unfinished`] one.
 ///
 /// # Errors
 ///
 /// Those of the file system and of `content`, each with the file's name.
 pub fn save(path: &Path, content: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
-    let file_failed = |source| FrameError::File { path: path.to_owned(), source };
-    let (file, temporary) = create_beside(path).map_err(file_failed)?;
-    let mut out = BufWriter::with_capacity(1 << 20, file);
-    let written = content(&mut out)
-        .map_err(|source| FrameError::Content { path: path.to_owned(), source: source.into() })
-        .and_then(|()| out.flush().map_err(file_failed));
-    drop(out);
-    let done = written.and_then(|()| fs::rename(&temporary, path).map_err(file_failed));
-    if done.is_err() {
-        // The first error is the one to tell.
-        let _ = fs::remove_file(&temporary);
-    }
-    done
+    let mut file = Unfinished::create(path)?;
+    content(file.out())
+        .map_err(|source| FrameError::Content { path: path.to_owned(), source: source.into() })?;
+    file.finish()
+}
+
+fn file_failed(path: &Path, source: std::io::Error) -> FrameError {
+    FrameError::File { path: path.to_owned(), source }
 }
 
 /// A new file in the directory of `path`, under a name that nobody has.

@@ -30,7 +30,7 @@ pub use background::Background;
 pub use compare::{Difference, compare};
 pub use error::{FrameError, Result};
 pub use exr::write_exr;
-pub use file::save;
+pub use file::{Unfinished, save};
 pub use frame::{Frame, Layer, Values};
 pub use npz::write_npz;
 pub use png::{PngOptions, Transparency, read_png, scene_in_png, write_png};

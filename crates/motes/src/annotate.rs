@@ -22,6 +22,8 @@ const NEAR: f64 = 1e-3;
 pub(crate) struct Annotated<'a> {
     pub systems: &'a [Loaded],
     pub frame: usize,
+    /// Whether it is one of several frames.
+    pub film: bool,
 }
 
 /// All annotations of a picture.
@@ -39,7 +41,7 @@ pub(crate) fn annotations(
         legend: (overlay.legend != Show::Off).then(|| legend(annotated.systems)).flatten(),
         scale_bar: on(overlay.scale_bar, view.projection == Projection::Orthographic)
             .then(|| scale_bar(view)),
-        caption: on(overlay.time, annotated.frame > 0)
+        caption: on(overlay.time, annotated.film || annotated.frame > 0)
             .then(|| caption(annotated.systems, annotated.frame)),
         axes: on(overlay.axes, false).then(|| axes(view)),
     }

@@ -1,5 +1,7 @@
 //! What can go wrong, and whose fault it is.
 
+use motes_film::FilmError;
+
 /// The result of Motes.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -23,6 +25,9 @@ pub enum Error {
     /// A picture could not be written or read.
     #[error(transparent)]
     Frame(#[from] motes_frame::FrameError),
+    /// A film could not be made.
+    #[error(transparent)]
+    Film(#[from] FilmError),
     /// What was asked for makes no sense for this data.
     #[error("{0}")]
     Usage(String),
@@ -32,11 +37,13 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code: 2 for bad usage, 1 for bad data.
+    /// The exit code: 2 for bad usage, 1 for bad data, 130 for what was cancelled.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::SceneFile { .. } | Self::Usage(_) => 2,
-            Self::Read(_) | Self::Frame(_) | Self::Cancelled => 1,
+            Self::Film(FilmError::TooLarge(_)) => 2,
+            Self::Read(_) | Self::Frame(_) | Self::Film(_) => 1,
+            Self::Cancelled => 130,
         }
     }
 }

@@ -25,9 +25,10 @@ mod system;
 
 pub use error::{Error, Result};
 pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
-pub use motes_frame::Frame;
-pub use motes_scene::{Scene, SceneError};
+pub use motes_film::{Film, FilmError, Settings as FilmSettings};
+pub use motes_frame::{Frame, Rgba8};
+pub use motes_scene::{Moment, Scene, SceneError};
 pub use open::{BUILT_IN, built_in_scene, is_picture, open, read_scene};
 pub use picture::Picture;
-pub use session::{Layers, Quiet, Session, Watch};
+pub use session::{Layers, Quiet, Session, Shot, Watch};
 pub use stats::{Stats, peak_memory_bytes};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use motes_frame::{Frame, PngOptions, Transparency, save, write_exr, write_npz, write_png};
+use motes_frame::{Frame, PngOptions, Rgba8, Transparency, save, write_exr, write_npz, write_png};
 
 use crate::Result;
 use crate::stats::Stats;
@@ -35,6 +35,11 @@ impl Picture {
             "npz" => self.save_layers(path),
             _ => self.save_png(path),
         }
+    }
+
+    /// What is shown, eight bits a channel, as a [`crate::Film`] takes it.
+    pub fn shown_8bit(&self) -> Rgba8 {
+        Rgba8::from(&self.shown)
     }
 
     /// Saves what is shown as PNG, with the scene in it.

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, ColorBy, Framing, RangeOver, Resolved, Scene, Show};
+use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Resolved, Scene, Show};
 use motes_spheres::{Center, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
@@ -25,6 +25,22 @@ pub enum Layers {
     No,
     /// All of them.
     Yes,
+}
+
+/// What a picture is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shot {
+    /// The frame of the sources.
+    pub frame: usize,
+    /// When in a film, for a camera that moves in one; none: it stands.
+    pub moment: Option<Moment>,
+}
+
+impl From<usize> for Shot {
+    /// A frame, before a camera that stands.
+    fn from(frame: usize) -> Self {
+        Self { frame, moment: None }
+    }
 }
 
 /// Room for a legend, in heights of its text.
@@ -52,6 +68,8 @@ pub struct Session {
     scene: Scene,
     series: Vec<Series>,
     pool: Option<rayon::ThreadPool>,
+    /// Whether the view was held for several frames.
+    film: bool,
     /// Colour range per system over its whole series, once it was asked for.
     ranges: Vec<Option<[f64; 2]>>,
     /// What could not be drawn.
@@ -73,7 +91,7 @@ impl Session {
         };
         let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let ranges = vec![None; series.len()];
-        Ok(Self { scene, series, pool, ranges, notes: Vec::new() })
+        Ok(Self { scene, series, pool, film: false, ranges, notes: Vec::new() })
     }
 
     /// The scene.
@@ -97,12 +115,18 @@ impl Session {
         of_series.chain(self.notes.iter().cloned()).collect()
     }
 
-    /// Renders frame `frame`.
+    /// Renders a frame, or a picture of a film (for which [`Session::hold_view`] has been called).
     ///
     /// # Errors
     /// The frame cannot be read, a property is not there, or the watch cancels.
-    pub fn render(&mut self, frame: usize, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
-        self.in_pool(|session| session.render_here(frame, layers, watch))
+    pub fn render(
+        &mut self,
+        shot: impl Into<Shot>,
+        layers: Layers,
+        watch: &dyn Watch,
+    ) -> Result<Picture> {
+        let shot = shot.into();
+        self.in_pool(|session| session.render_here(shot, layers, watch))
     }
 
     /// Works on the session's own threads, if it was given a number of them.
@@ -118,7 +142,8 @@ impl Session {
         }
     }
 
-    fn render_here(&mut self, frame: usize, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+    fn render_here(&mut self, shot: Shot, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+        let frame = shot.frame;
         let mut stats = Stats { threads: rayon::current_num_threads(), ..Stats::default() };
         let start = Instant::now();
         let particles = self.read(frame, watch)?;
@@ -138,7 +163,8 @@ impl Session {
         }
 
         let boxes = framed(&loaded, origin);
-        let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
+        let scene = self.scene_of(shot);
+        let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth.
         let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
@@ -146,14 +172,12 @@ impl Session {
         stats.ms.insert("trace", milliseconds(start));
 
         let start = Instant::now();
-        let shown = self.finish(&raw, &resolved, &Annotated { systems: &loaded, frame });
+        let annotated = Annotated { systems: &loaded, frame, film: self.film };
+        let shown = self.finish(&raw, &resolved, &annotated);
         stats.ms.insert("finish", milliseconds(start));
         count(&mut stats, &loaded);
         stats.hash = format!("{:016x}", raw.hash());
         stats.peak_memory = peak_memory_bytes();
-        let mut scene = self.scene.clone();
-        scene.system.iter_mut().for_each(|system| make_absolute(&mut system.source));
-        scene.image.frame = u32::try_from(frame).unwrap_or(u32::MAX);
         Ok(Picture {
             raw,
             shown,
@@ -163,8 +187,20 @@ impl Session {
         })
     }
 
-    /// Fixes the camera for a film: what is visible in the first, the middle and the last of `frames`
-    /// is framed, and stays so from then on. A position and target of the scene's own stay as they are.
+    /// The scene of one picture, which shows it again: its camera stands.
+    fn scene_of(&self, shot: Shot) -> Scene {
+        let mut scene = self.scene.clone();
+        if let Some(moment) = shot.moment {
+            scene.camera = scene.camera.at(moment);
+        }
+        scene.system.iter_mut().for_each(|system| make_absolute(&mut system.source));
+        scene.image.frame = u32::try_from(shot.frame).unwrap_or(u32::MAX);
+        scene
+    }
+
+    /// Fixes for a film what would change with what is visible: what is so in the first, the middle and
+    /// the last of `frames` is framed; how far things occlude, and radii that are measured, become those
+    /// of the first. What the scene says itself stays.
     ///
     /// # Errors
     /// As [`Session::render`].
@@ -188,15 +224,13 @@ impl Session {
         for frame in looks {
             let particles = self.read(frame, watch)?;
             let (loaded, origin) = self.load(particles)?;
+            loaded.iter().for_each(|l| l.hold_radius(&mut self.scene));
             boxes.extend(framed(&loaded, origin));
             last = loaded;
         }
-        let view = self.scene.resolve_framing(self.framing(&last, &boxes))?.view;
-        let camera = &mut self.scene.camera;
-        camera.position.get_or_insert(view.eye);
-        camera.target.get_or_insert(view.target);
-        camera.up.get_or_insert(view.up);
-        camera.height.get_or_insert(2.0 * view.half_height);
+        let framing = self.framing(&last, &boxes);
+        self.scene.hold(framing)?;
+        self.film |= frames.start() < frames.end();
         Ok(())
     }
 
@@ -259,12 +293,8 @@ impl Session {
         let systems: Vec<Spheres<'_>> =
             loaded.iter().map(|l| Spheres { classes: &l.classes, visible: &l.visible }).collect();
         let rays = resolved.view.rays(origin);
-        let view = View {
-            rays: &rays,
-            systems: &systems,
-            paint: &Paints(loaded),
-            lights: &resolved.lights,
-        };
+        let lights = resolved.lights.about(origin);
+        let view = View { rays: &rays, systems: &systems, paint: &Paints(loaded), lights: &lights };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),

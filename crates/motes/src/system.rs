@@ -10,6 +10,7 @@ use motes_scene::{Bounds, Scene, System};
 
 use crate::annotate::box_shown;
 use crate::paint::{Paint, find_property};
+use crate::radius::Rule;
 use crate::{Error, Result, radius};
 
 /// A system ready to be drawn.
@@ -54,6 +55,15 @@ impl Loaded {
         let paint = Paint::new(&particles, &system.color, range)?;
         let sim_box = box_shown(&particles, scene.overlay.r#box);
         Ok(Self { number, particles, sim_box, classes, visible, paint })
+    }
+
+    /// Where radii were measured in this frame, makes them the scene's for all frames.
+    pub fn hold_radius(&self, scene: &mut Scene) {
+        let Some(system) = scene.system.get_mut(self.number as usize) else { return };
+        let measured = matches!(radius::rule(&self.particles, system), Rule::HalfSpacing);
+        if let Some(grid) = self.classes.grids.first().filter(|_| measured) {
+            system.radius = Some(f64::from(grid.radius_at(0)) / system.radius_scale);
+        }
     }
 
     /// How many particles pass the filters.

@@ -26,6 +26,8 @@ mod color_points;
 mod colormap;
 mod elements;
 mod error;
+mod light;
+mod motion;
 mod resolve;
 mod scene;
 mod set;
@@ -38,9 +40,12 @@ pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use colormap::ColorMap;
 pub use elements::Element;
 pub use error::{Result, SceneError, nearest};
-pub use resolve::{Background, KeyLight, Lights, Resolved};
+pub use light::{KeyLight, Lamp, Lights, Toward};
+pub use motion::Moment;
+pub use resolve::{Background, Resolved};
 pub use scene::{
-    Axis, Camera, ColorBy, Coloring, Component, Filter, Image, Light, Overlay, Palette, Primary,
-    Projection, RangeOver, RelativeTo, Scene, Show, Spheres, System, Tone,
+    Axis, Camera, ColorBy, Coloring, Component, Film, Filter, Image, Keyframe, Light, Overlay,
+    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Scene, Show, Spheres, System,
+    Tone,
 };
 pub use settings::{Field, Setting, Shape};

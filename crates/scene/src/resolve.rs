@@ -6,7 +6,8 @@ use crate::bounds::Bounds;
 use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
-use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
+use crate::light::Lights;
+use crate::scene::{Camera, Film, Image, Light, Overlay, Scene, Spheres, System};
 
 /// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -29,72 +30,6 @@ pub struct Background {
     pub top: Vec3,
     /// At the bottom.
     pub bottom: Vec3,
-}
-
-/// The lights in world coordinates and linear light: a surface of albedo ρ and normal n that sees them
-/// all has the light ρ·(key·max(0, n·d) + fill(n)).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lights {
-    /// The key light.
-    pub key: KeyLight,
-    /// The upward axis of the fill, a unit vector.
-    pub up: Vec3,
-    /// Fill light on a surface that faces up.
-    pub sky: Vec3,
-    /// Fill light on a surface that faces down.
-    pub ground: Vec3,
-    /// Light on every surface alike.
-    pub ambient: Vec3,
-    /// Directions in which the fill is looked for, for each sample; 0 for none.
-    pub occlusion_rays: u32,
-    /// How far away something keeps the fill from a surface.
-    pub occlusion_radius: f32,
-}
-
-/// A distant round light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KeyLight {
-    /// Unit vector towards its middle.
-    pub direction: Vec3,
-    /// Its light on a surface that faces it.
-    pub color: Vec3,
-    /// Cosine of half the angle across it; 1 for a point.
-    pub cos_half_angle: f32,
-    /// Rays towards it for each sample; 0 if it casts no shadows.
-    pub shadow_rays: u32,
-}
-
-/// By default things occlude up to this part of the diagonal of what is visible.
-const OCCLUSION_PART: f64 = 6.0;
-
-impl Lights {
-    /// Fill light on an unoccluded surface of unit normal `n`: half of each hemisphere's weight at the
-    /// horizon.
-    pub fn fill(&self, n: Vec3) -> Vec3 {
-        self.ground.lerp(self.sky, 0.5 + 0.5 * n.dot(self.up))
-    }
-
-    fn new(light: &Light, camera: &Camera, view: &CameraView, diagonal: f64) -> Self {
-        let d = light.direction;
-        let direction = match light.relative_to {
-            RelativeTo::World => d,
-            RelativeTo::Camera => view.right * d.x + view.up * d.y - view.forward * d.z,
-        };
-        Self {
-            key: KeyLight {
-                direction: direction.normalize().as_vec3(),
-                color: Vec3::from(light.color.linear()) * light.intensity as f32,
-                cos_half_angle: (light.softness.to_radians() / 2.0).cos() as f32,
-                shadow_rays: light.shadow_rays,
-            },
-            up: camera.up_axis.vector().as_vec3(),
-            sky: Vec3::from(light.sky.linear()) * light.fill as f32,
-            ground: Vec3::from(light.ground.linear()) * light.fill as f32,
-            ambient: Vec3::splat(light.ambient as f32),
-            occlusion_rays: light.occlusion_rays,
-            occlusion_radius: light.occlusion_radius.unwrap_or(diagonal / OCCLUSION_PART) as f32,
-        }
-    }
 }
 
 impl Scene {
@@ -134,6 +69,7 @@ impl Scene {
         check_camera(&self.camera)?;
         check_image(&self.image)?;
         check_light(&self.light)?;
+        check_film(&self.film)?;
         check_spheres(&self.spheres)?;
         check_overlay(&self.overlay)
     }
@@ -202,7 +138,40 @@ fn check_camera(camera: &Camera) -> Result<()> {
         let apart = (target - position).normalize_or_zero() != DVec3::ZERO;
         need("camera.position", position.to_array(), apart, "a point apart from camera.target")?;
     }
+    need("camera.turn", camera.turn, camera.turn.is_finite(), "degrees")?;
+    check_keyframes(camera)
+}
+
+fn check_keyframes(camera: &Camera) -> Result<()> {
+    let mut before = None;
+    for (i, key) in camera.keyframe.iter().enumerate() {
+        let path = |name: &str| format!("camera.keyframe.{i}.{name}");
+        let fits = (0.0..=1.0).contains(&key.at) && before.is_none_or(|t| t < key.at);
+        need(&path("at"), key.at, fits, "a number in 0 to 1, greater than the one before")?;
+        before = Some(key.at);
+        for (name, v) in [("position", key.position), ("target", key.target)] {
+            let fits = v.is_none_or(|v| v.is_finite());
+            need(&path(name), v.map(|v| v.to_array()), fits, "finite coordinates")?;
+        }
+        need_vector(&path("up"), key.up)?;
+        let fits = key.fov.is_none_or(|fov| fov > 0.0 && fov < 180.0);
+        need(&path("fov"), key.fov, fits, "degrees above 0 and below 180")?;
+        let fits = key.height.is_none_or(positive);
+        need(&path("height"), key.height, fits, "a number above 0")?;
+        let ends = key.position.or(camera.position).zip(key.target.or(camera.target));
+        let apart = ends.is_none_or(|(p, t)| (t - p).normalize_or_zero() != DVec3::ZERO);
+        let found = ends.map(|(position, _)| position.to_array());
+        need(&path("position"), found, apart, "a point apart from the target")?;
+    }
     Ok(())
+}
+
+fn check_film(film: &Film) -> Result<()> {
+    let (frames, fps, quality) = (film.frames, film.fps, film.quality);
+    let fits = frames.is_none_or(|n| (1..=1_000_000).contains(&n));
+    need("film.frames", frames, fits, "1 to 1000000 pictures")?;
+    need("film.fps", fps, (0.1..=1000.0).contains(&fps), "0.1 to 1000 pictures per second")?;
+    need("film.quality", quality, quality <= 100, "a number in 0 to 100")
 }
 
 fn check_image(image: &Image) -> Result<()> {
@@ -219,7 +188,11 @@ fn check_image(image: &Image) -> Result<()> {
 
 fn check_light(light: &Light) -> Result<()> {
     need_vector("light.direction", Some(light.direction))?;
+    let position = light.position;
+    let fits = position.is_none_or(|p| p.is_finite());
+    need("light.position", position.map(|p| p.to_array()), fits, "finite coordinates")?;
     let numbers = [
+        ("light.size", light.size),
         ("light.intensity", light.intensity),
         ("light.fill", light.fill),
         ("light.ambient", light.ambient),
@@ -284,6 +257,22 @@ mod tests {
             (&["spheres.block=0"], "spheres.block"),
             (&["light.direction=0,0,0"], "light.direction"),
             (&["light.softness=-1"], "light.softness"),
+            (&["light.position=nan,0,0"], "light.position"),
+            (&["light.size=-1"], "light.size"),
+            (&["camera.turn=inf"], "camera.turn"),
+            (&["camera.keyframe=[{at=1.5}]"], "camera.keyframe.0.at"),
+            (&["camera.keyframe=[{at=0.5}, {at=0.5}]"], "camera.keyframe.1.at"),
+            (&["camera.keyframe=[{fov=180}]"], "camera.keyframe.0.fov"),
+            (&["camera.keyframe=[{up=[0,0,0]}]"], "camera.keyframe.0.up"),
+            (&["camera.keyframe=[{height=0}]"], "camera.keyframe.0.height"),
+            (&["camera.keyframe=[{target=[nan,0,0]}]"], "camera.keyframe.0.target"),
+            (
+                &["camera.keyframe=[{position=[1,2,3]}]", "camera.target=1,2,3"],
+                "camera.keyframe.0.position",
+            ),
+            (&["film.frames=0"], "film.frames"),
+            (&["film.fps=0"], "film.fps"),
+            (&["film.quality=101"], "film.quality"),
             (&["system.radius=0"], "system.0.radius"),
             (&["system.radius_scale=inf"], "system.0.radius_scale"),
             (&["system.radii.Na=-1"], "system.0.radii.Na"),
@@ -307,23 +296,5 @@ mod tests {
         scene.set("system.color.map", "mgama").unwrap();
         let error = scene.check().unwrap_err().to_string();
         assert_eq!(error, "no colour map `mgama`; did you mean `magma`?");
-    }
-
-    #[test]
-    fn light_follows_the_camera_or_stays() {
-        let mut scene = Scene::default();
-        scene.set("camera.position", "0,-10,0").unwrap();
-        scene.set("camera.target", "0,0,0").unwrap();
-        scene.set("light.direction", "0,0,1").unwrap();
-        // Towards the viewer: back to where the camera stands.
-        let lights = scene.resolve(None).unwrap().lights;
-        assert!(lights.key.direction.abs_diff_eq(Vec3::NEG_Y, 1e-6));
-        scene.set("light.relative_to", "world").unwrap();
-        let lights = scene.resolve(None).unwrap().lights;
-        assert_eq!(lights.key.direction, Vec3::Z);
-        // Fill: the sky from above, the ground from below, half and half at the horizon.
-        assert_eq!(lights.fill(Vec3::Z), lights.sky);
-        assert_eq!(lights.fill(Vec3::NEG_Z), lights.ground);
-        assert!(lights.fill(Vec3::X).abs_diff_eq((lights.sky + lights.ground) / 2.0, 1e-6));
     }
 }

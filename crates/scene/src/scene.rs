@@ -19,6 +19,8 @@ settings! {
         image: Image = Image::default(),
         /// Lights: one key light with soft shadows, and a fill from sky and ground.
         light: Light = Light::default(),
+        /// Films: how many pictures, how fast, how good.
+        film: Film = Film::default(),
         /// The spheres renderer.
         spheres: Spheres = Spheres::default(),
         /// What is drawn over the picture.
@@ -115,6 +117,40 @@ settings! {
         height: Option<f64> = None => "10.0",
         /// Free space around what is framed, as a part of half the picture.
         margin: f64 = 0.05,
+        /// Degrees the camera goes around the target in a film, about the up axis, to the right: 360 ends where it began.
+        turn: f64 = 0.0,
+        /// Where the camera is at times of a film; between them it moves smoothly.
+        keyframe: Vec<Keyframe> = Vec::new(),
+    }
+}
+
+settings! {
+    /// The camera at a time of a film; what is none is as in the camera.
+    pub struct Keyframe {
+        /// When: 0 is the first picture of the film, 1 the last.
+        at: f64 = 0.0,
+        /// Where the camera stands, in world coordinates.
+        position: Option<DVec3> = None => "[30.0, -20.0, 15.0]",
+        /// The point looked at, in world coordinates.
+        target: Option<DVec3> = None => "[0.0, 0.0, 0.0]",
+        /// What is up in the picture.
+        up: Option<DVec3> = None => "[0.0, 0.0, 1.0]",
+        /// Vertical field of view of the perspective, degrees.
+        fov: Option<f64> = None => "20.0",
+        /// Height of the picture in world units, for orthographic.
+        height: Option<f64> = None => "10.0",
+    }
+}
+
+settings! {
+    /// A film: several frames, or a camera that moves.
+    pub struct Film {
+        /// How many pictures; none: one for each frame, or 8 seconds of a single frame that the camera moves about.
+        frames: Option<u32> = None => "200",
+        /// Pictures per second.
+        fps: f64 = 25.0,
+        /// 0 (a small file) to 100 (a true one).
+        quality: u32 = 75,
     }
 }
 
@@ -145,15 +181,21 @@ settings! {
 settings! {
     /// Light: a key light that casts soft shadows and a fill from sky and ground.
     pub struct Light {
+        /// What all of the light is like, as far as nothing else is said: studio, soft, sun, overcast, side, headlight or flat. Setting it sets the whole light.
+        preset: Preset = Preset::Studio,
         /// The way to the key light: x right, y up, z towards the viewer if relative to the camera; else world coordinates.
         direction: DVec3 = DVec3::new(-0.5, 0.8, 0.6),
         /// What direction is relative to: camera (it follows) or world.
         relative_to: RelativeTo = RelativeTo::Camera,
+        /// Where the key light stands, in world coordinates; none: far away, at direction.
+        position: Option<DVec3> = None => "[10.0, 0.0, 20.0]",
+        /// Diameter of a key light that has a position, in world units: 0 casts hard shadows.
+        size: f64 = 0.0,
         /// Colour of the key light.
         color: Color = Color::hex(0xffffff),
-        /// Strength of the key light; 1 lights a white surface that faces it to white.
+        /// Strength of the key light; 1 lights a white surface that faces it to white, however far it is.
         intensity: f64 = 0.7,
-        /// Angle across the key light, degrees: 0 casts hard shadows, 20 soft ones.
+        /// Angle across a key light that is far away, degrees: 0 casts hard shadows, 20 soft ones.
         softness: f64 = 12.0,
         /// Rays to the key light for each sample of a pixel: more make soft shadows smoother; 0: it casts none.
         shadow_rays: u32 = 1,
@@ -277,6 +319,26 @@ words! {
         None = "none",
         /// A soft shoulder.
         Filmic = "filmic",
+    }
+}
+
+words! {
+    /// A light that was set up before, see [`Light::of`].
+    pub enum Preset {
+        /// A large lamp above on the left, and a bright room.
+        Studio = "studio",
+        /// A very large lamp: shadows without edges.
+        Soft = "soft",
+        /// A small warm light and a blue sky: sharp shadows.
+        Sun = "sun",
+        /// Light from the whole sky: shape by crevices only.
+        Overcast = "overcast",
+        /// A lamp low at the side, and hardly any fill.
+        Side = "side",
+        /// A lamp at the eye: no shadows to be seen.
+        Headlight = "headlight",
+        /// No light and no shadow: colours as in the colour map.
+        Flat = "flat",
     }
 }
 

@@ -5,7 +5,7 @@ use toml::{Table, Value};
 use crate::error::{Result, SceneError, likeness, quoted};
 use crate::scene::Scene;
 use crate::settings::{Setting, Shape};
-use crate::text::join;
+use crate::text::{fill_in_preset, join};
 
 impl Scene {
     /// Sets a parameter from `path=value`, as [`Scene::set`] does.
@@ -35,7 +35,15 @@ impl Scene {
         let tree = Value::Table(Table::try_from(&*self).map_err(|_| wrong())?);
         for reading in readings(value) {
             let mut tree = tree.clone();
+            // A preset is no value beside others: it stands for all of them.
+            if let (["light", "preset"], Value::Table(tree)) = (&names[..], &mut tree) {
+                tree.remove("light");
+                tree.insert("light".into(), Value::Table(Table::new()));
+            }
             assign(&shape, &mut tree, Target { names: &names, path: "" }, &reading)?;
+            if let Value::Table(tree) = &mut tree {
+                fill_in_preset(tree);
+            }
             if let Ok(scene) = tree.try_into() {
                 *self = scene;
                 return Ok(());
@@ -123,8 +131,9 @@ fn unknown_path(shape: &Shape, path: &str) -> SceneError {
     let score = |known: &str| {
         let known_last = known.rsplit('.').next().unwrap_or(known);
         let by_last = likeness(last, known_last);
-        // The whole path breaks ties between parameters of one name.
-        by_last.max(likeness(&whole, known)) + 0.01 * likeness(&whole, known)
+        // The whole path breaks ties between parameters of one name, and then the one higher up wins.
+        let depth = known.matches('.').count() as f64;
+        by_last.max(likeness(&whole, known)) + 0.01 * likeness(&whole, known) - 0.005 * depth
     };
     let nearest = known.iter().map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
     let hint = match nearest {

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
 use crate::error::{Result, SceneError, hint, quoted};
-use crate::scene::Scene;
+use crate::scene::{Light, Scene};
 use crate::settings::{Field, Setting, Shape};
 
 impl Scene {
@@ -27,7 +27,13 @@ impl Scene {
         if let Some(Unknown { span, reason }) = found {
             return Err(SceneError::Text { line: at(span), reason });
         }
-        toml::from_str(text).map_err(|e| type_error(text, &e, &values))
+        let scene: Self = toml::from_str(text).map_err(|e| type_error(text, &e, &values))?;
+        if scene.light.preset == Light::default().preset {
+            return Ok(scene);
+        }
+        let mut tree: Table = toml::from_str(text).map_err(|e| type_error(text, &e, &values))?;
+        fill_in_preset(&mut tree);
+        Value::Table(tree).try_into().map_err(|e| type_error(text, &e, &values))
     }
 
     /// The scene as TOML, every parameter that has a value, without comments.
@@ -138,6 +144,18 @@ fn line_of(text: &str, at: usize) -> usize {
     1 + text.bytes().take(at).filter(|b| *b == b'\n').count()
 }
 
+/// Gives the light what its preset says and the text does not.
+pub(crate) fn fill_in_preset(scene: &mut Table) {
+    let Some(Value::Table(light)) = scene.get_mut("light") else { return };
+    let preset = light.get("preset").and_then(|word| word.clone().try_into().ok());
+    let Some(Ok(defaults)) = preset.map(|preset| Table::try_from(Light::of(preset))) else {
+        return;
+    };
+    for (name, value) in defaults {
+        light.entry(name).or_insert(value);
+    }
+}
+
 pub(crate) fn join(path: &str, name: &str) -> String {
     if path.is_empty() { name.into() } else { format!("{path}.{name}") }
 }
@@ -208,11 +226,12 @@ mod tests {
                         assert!(f.meaning.ends_with('.') && !f.meaning.contains('\n'), "{path}");
                         if let Some(example) = f.example {
                             let mut scene = Scene::default();
-                            if let Some(of) = path.strip_prefix("system.filter.") {
-                                scene.set("system.filter", "[{}]").unwrap();
-                                scene.set(&format!("system.filter.0.{of}"), example).unwrap();
-                            } else {
-                                scene.set(&path, example).unwrap();
+                            match path.rsplit_once('.') {
+                                Some((list @ ("system.filter" | "camera.keyframe"), of)) => {
+                                    scene.set(list, "[{}]").unwrap();
+                                    scene.set(&format!("{list}.0.{of}"), example).unwrap();
+                                }
+                                _ => scene.set(&path, example).unwrap(),
                             }
                             assert_ne!(scene, Scene::default(), "{path}");
                         }

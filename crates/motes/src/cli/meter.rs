@@ -1,7 +1,8 @@
 //! A progress bar, where there is a terminal to see it and work that is worth it.
 
 use std::io::IsTerminal;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -12,10 +13,18 @@ use super::talk::Talk;
 /// Work that takes less is done before one has read about it.
 const WORTH: Duration = Duration::from_secs(1);
 
-/// Shows long work on stderr.
-pub(crate) struct Meter(Option<Mutex<State>>);
+/// Parts of a picture in the bar of a film.
+const PARTS: u64 = 100;
+
+/// Shows long work on stderr, and ends it when the user has had enough.
+pub(crate) struct Meter {
+    state: Option<Mutex<State>>,
+    cancelled: Arc<AtomicBool>,
+}
 
 struct State {
+    /// Which picture of a film, of how many.
+    film: Option<(u64, u64)>,
     stage: &'static str,
     since: Instant,
     bar: Option<ProgressBar>,
@@ -25,13 +34,29 @@ impl Meter {
     /// A meter that shows nothing where the user wants quiet or stderr is no terminal.
     pub fn new(talk: Talk) -> Self {
         let shown = !talk.quiet && std::io::stderr().is_terminal();
-        let state = || Mutex::new(State { stage: "", since: Instant::now(), bar: None });
-        Self(shown.then(state))
+        let state = || State { film: None, stage: "", since: Instant::now(), bar: None };
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let asked = cancelled.clone();
+        // Without a handler the system ends it, and leaves an unfinished file.
+        let _ = ctrlc::set_handler(move || {
+            if asked.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        Self { state: shown.then(|| Mutex::new(state())), cancelled }
+    }
+
+    /// From here on one bar is for all pictures of a film.
+    pub fn picture(&self, picture: usize, pictures: usize) {
+        if let Some(mut state) = self.state.as_ref().and_then(|state| state.lock().ok()) {
+            state.film = (pictures > 1).then_some((picture as u64, pictures as u64));
+            state.tell("render", 0, 1);
+        }
     }
 
     /// Takes the bar away, for other lines.
     pub fn clear(&self) {
-        if let Some(mut state) = self.0.as_ref().and_then(|state| state.lock().ok()) {
+        if let Some(mut state) = self.state.as_ref().and_then(|state| state.lock().ok()) {
             state.begin("");
         }
     }
@@ -46,10 +71,10 @@ impl Drop for Meter {
 impl Watch for Meter {
     fn progress(&self, stage: &'static str, done: u64, total: u64) -> bool {
         // Whoever finds another thread telling has nothing to add.
-        if let Some(mut state) = self.0.as_ref().and_then(|state| state.try_lock().ok()) {
+        if let Some(mut state) = self.state.as_ref().and_then(|state| state.try_lock().ok()) {
             state.tell(stage, done, total);
         }
-        true
+        !self.cancelled.load(Ordering::Relaxed)
     }
 }
 
@@ -62,6 +87,13 @@ impl State {
     }
 
     fn tell(&mut self, stage: &'static str, done: u64, total: u64) {
+        let (stage, done, total) = match self.film {
+            Some((picture, pictures)) if stage == "render" => {
+                ("film", picture * PARTS + PARTS * done / total.max(1), pictures * PARTS)
+            }
+            Some(_) => return,
+            None => (stage, done, total),
+        };
         if self.stage != stage {
             self.begin(stage);
         }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use motes::{Layers, Picture, Scene, SceneError, Session, built_in_scene, is_picture, read_scene};
+use motes::{
+    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Session, Shot, built_in_scene,
+    is_picture, read_scene,
+};
 
 use super::frames::{Frames, numbered};
 use super::meter::Meter;
@@ -15,8 +18,8 @@ Examples:
   motes render -o picture.png                        a picture, without any file
   motes render dump.lammpstrj -o out.png --color-by Velocity --colormap magma
   motes render 'out_*.vtk' -o film/%04d.png --frame all --size 1080p
-  motes render fluid.ply walls.ply -o out.png --set system.1.color.by=uniform
-  motes render picture.png -o large.png --size 4k    the same picture, larger";
+  motes render dump.lammpstrj --video turn.mp4 --turn 360
+  motes render fluid.ply walls.ply -o out.png --set system.1.color.by=uniform";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
@@ -26,8 +29,11 @@ pub(crate) struct Args {
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
     /// Picture: .png, .exr or .npz; %04d for the frame
-    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["layers", "stats"])]
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["video", "layers", "stats"])]
     output: Option<String>,
+    /// Film of all frames, or of --frame: .mp4
+    #[arg(long, value_name = "FILE")]
+    video: Option<String>,
     /// Pixels, or 720p, 1080p, 1440p, 4k, 8k
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -78,6 +84,12 @@ struct Look {
     background: Option<String>,
     #[command(flatten)]
     camera: CameraFlags,
+    /// Go around the target in a film
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    turn: Option<String>,
+    /// studio, soft, sun, overcast, side, …
+    #[arg(long, value_name = "NAME")]
+    light: Option<String>,
     /// One radius for all particles
     #[arg(long, value_name = "R", allow_hyphen_values = true)]
     radius: Option<String>,
@@ -196,6 +208,8 @@ enum Renderer {
 struct Plan {
     scene: Scene,
     frames: Frames,
+    /// Whether several pictures are made, where there are several.
+    film: bool,
     files: Files,
     threads: Option<usize>,
 }
@@ -203,6 +217,7 @@ struct Plan {
 /// The files of each frame, by their names before the frame's number is put in.
 struct Files {
     picture: Option<String>,
+    video: Option<String>,
     layers: Option<String>,
     stats: Option<String>,
 }
@@ -220,18 +235,54 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             (last, last)
         }
     };
-    if first < last {
+    let shots = if plan.film { shots(session.scene(), (first, last)) } else { vec![first.into()] };
+    if shots.len() > 1 {
         session.hold_view(first..=last, &meter)?;
     }
-    for frame in first..=last {
+    let mut film = plan.files.begin_film(session.scene())?;
+    let begun = Instant::now();
+    for (i, shot) in shots.iter().enumerate() {
+        meter.picture(i, shots.len());
         let start = Instant::now();
-        let picture = session.render(frame, plan.files.layers_wanted(), &meter)?;
+        let picture = session.render(*shot, plan.files.layers_wanted(), &meter)?;
+        // One picture for each frame has its number; else they are counted.
+        let number = if shots.len() == last - first + 1 { shot.frame } else { i };
+        let written = plan.files.write(&picture, number)?;
+        if !written.is_empty() {
+            meter.clear();
+            report(talk, &picture, &written, start);
+        }
+        if let Some(film) = &mut film {
+            film.add(picture.shown_8bit()).map_err(motes::Error::from)?;
+        }
+    }
+    if let (Some(film), Some(name)) = (film, &plan.files.video) {
+        film.finish().map_err(motes::Error::from)?;
         meter.clear();
-        let written = plan.files.write(&picture, frame)?;
-        report(talk, &picture, &written, start);
+        report_film(talk, (name, session.scene()), shots.len(), begun);
     }
     talk.warn(&session.warnings());
     Ok(())
+}
+
+/// Seconds of a film of a single frame, where nothing else is said.
+const STILL_SECONDS: f64 = 8.0;
+
+/// The pictures of a film of the frames `first` to `last`.
+fn shots(scene: &Scene, (first, last): (usize, usize)) -> Vec<Shot> {
+    let frames = last - first + 1;
+    let pictures = match scene.film.frames {
+        Some(pictures) => pictures as usize,
+        None if frames == 1 && scene.camera.moves() => {
+            (STILL_SECONDS * scene.film.fps).ceil() as usize
+        }
+        None => frames,
+    };
+    let shot = |picture| Shot {
+        frame: first + picture * frames / pictures,
+        moment: Some(Moment { picture, pictures }),
+    };
+    (0..pictures).map(shot).collect()
 }
 
 impl Args {
@@ -244,18 +295,43 @@ impl Args {
         }
         let mut scene = self.base()?;
         self.edit(&mut scene)?;
-        let frames = self.frame.unwrap_or(Frames::One(scene.image.frame as usize));
-        if matches!(frames, Frames::Range(..)) {
+        let film = self.is_film(&scene)?;
+        let frames = self.frame.unwrap_or(match film {
+            true => Frames::Range(0, None),
+            false => Frames::One(scene.image.frame as usize),
+        });
+        if film {
             // The same colour means the same value all through a film.
             scene.set("system.color.range_over", "series").map_err(motes::Error::from)?;
         }
         let files = Files {
             picture: self.output.clone(),
+            video: self.video.clone(),
             layers: self.layers.clone(),
             stats: self.stats.clone(),
         };
-        files.check(frames)?;
-        Ok(Plan { scene, frames, files, threads: self.threads })
+        files.check(film)?;
+        Ok(Plan { scene, frames, film, files, threads: self.threads })
+    }
+
+    /// Whether a film is made: a video, a range of frames, or numbered pictures of what the scene has in
+    /// motion.
+    fn is_film(&self, scene: &Scene) -> Result<bool, Failure> {
+        if self.video.is_some() && scene.image.transparent {
+            return Err(Failure::usage(
+                "--video: a film has no transparency; leave --transparent out",
+            ));
+        }
+        if self.video.is_some() || matches!(self.frame, Some(Frames::Range(..))) {
+            return Ok(true);
+        }
+        let moves = scene.camera.moves() || scene.film.frames.is_some();
+        let films = moves && self.output.as_ref().is_some_and(|name| numbered(name, 0).is_some());
+        if self.look.turn.is_some() && !films {
+            let message = "--turn: a film needs --video, or %04d in the name of --output";
+            return Err(Failure::usage(message));
+        }
+        Ok(films)
     }
 
     /// The scene before flags: a file's, a picture's, or the default with the sources in it.
@@ -297,6 +373,8 @@ impl Args {
             ("--samples", "image.samples", &samples),
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
+            ("--turn", "camera.turn", &look.turn),
+            ("--light", "light.preset", &look.light),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
             ("--color-by", "system.color.by", &look.color_by),
@@ -346,9 +424,10 @@ impl Overlay {
 impl Files {
     /// Refuses names that say no format, would be written twice, or lie in no directory, before
     /// there is any work to lose.
-    fn check(&self, frames: Frames) -> Result<(), Failure> {
+    fn check(&self, film: bool) -> Result<(), Failure> {
         let named = [
             ("--output", &self.picture, &["png", "exr", "npz"][..]),
+            ("--video", &self.video, &["mp4"]),
             ("--layers", &self.layers, &["npz", "exr"]),
             ("--stats", &self.stats, &["json"]),
         ];
@@ -359,11 +438,11 @@ impl Files {
                 let message = format!("{flag} {name}: expected a name in {}", formats.join(", "));
                 return Err(Failure::usage(message));
             }
-            if matches!(frames, Frames::Range(..)) && numbered(name, 0).is_none() {
+            if film && flag != "--video" && numbered(name, 0).is_none() {
                 let message = "expected %04d or {} in the name, for the number of the frame";
                 return Err(Failure::usage(format!("{flag} {name}: {message}")));
             }
-            let name = numbered(name, 0).unwrap_or_else(|| name.clone());
+            let name = numbered(name, 0).filter(|_| flag != "--video").unwrap_or(name.clone());
             let folder = Path::new(&name).parent().filter(|f| !f.as_os_str().is_empty());
             if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
                 let message = format!("there is no directory {}", folder.display());
@@ -371,6 +450,18 @@ impl Files {
             }
         }
         Ok(())
+    }
+
+    /// Begins the video, if there is to be one.
+    fn begin_film(&self, scene: &Scene) -> Result<Option<Film>, Failure> {
+        let Some(name) = &self.video else { return Ok(None) };
+        let settings = FilmSettings {
+            size: (scene.image.width, scene.image.height),
+            fps: scene.film.fps,
+            quality: scene.film.quality,
+        };
+        let film = Film::create(Path::new(name), settings).map_err(motes::Error::from)?;
+        Ok(Some(film))
     }
 
     /// Layers are rendered only if some file holds them.
@@ -430,4 +521,21 @@ fn report(talk: Talk, picture: &Picture, written: &[String], start: Instant) {
         tell(&format!("  MB: {}", bytes.join(", ")));
         tell(&format!("  {} threads, {}, hash {}", stats.threads, stats.simd, stats.hash));
     }
+}
+
+/// One line: what was written, pictures, size, length, and how long it took.
+fn report_film(talk: Talk, (name, scene): (&str, &Scene), pictures: usize, begun: Instant) {
+    if talk.quiet {
+        return;
+    }
+    let bytes = std::fs::metadata(name).map_or(0, |file| file.len());
+    tell(&format!(
+        "{name}: {} pictures, {}×{}, {:.1} s, {:.1} MB, in {:.1} s",
+        count(pictures),
+        scene.image.width,
+        scene.image.height,
+        pictures as f64 / scene.film.fps,
+        bytes as f64 / 1e6,
+        begun.elapsed().as_secs_f64()
+    ));
 }
