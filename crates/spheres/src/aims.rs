@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 use glam::Vec3;
-use motes_scene::Lights;
+use motes_scene::{Lights, Toward};
 
 use crate::lanes::Lanes;
 use crate::near::Shelves;
@@ -20,7 +20,9 @@ pub(crate) struct Aims {
     samples: u32,
     /// Towards the key light: for each turn and each sample, its rays.
     key: Vec<Vec3>,
-    /// The same, coordinate by coordinate.
+    /// The part of the light each of them leads to: of its area, and around it, in turns.
+    key_parts: Vec<(f32, f32)>,
+    /// The directions, coordinate by coordinate.
     key_rows: [Lanes<f32>; 3],
     /// Shadow rays of a sample.
     pub key_rays: usize,
@@ -41,12 +43,14 @@ impl Aims {
     pub fn new(lights: &Lights, samples: u32, systems: &[Spheres<'_>]) -> Self {
         let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
         let key_rays = lights.key.shadow_rays;
-        let mut key = Vec::new();
+        let (mut key, mut key_parts) = (Vec::new(), Vec::new());
         for turn in 0..TURNS {
             for sample in 0..samples {
                 for ray in 0..key_rays {
                     let place = (ray * samples + sample, key_rays * samples);
-                    key.push(key_direction(&light, turn, place));
+                    let (area, around) = key_part(turn, place);
+                    key.push(light.direction(area, around));
+                    key_parts.push((area, around));
                 }
             }
         }
@@ -56,7 +60,9 @@ impl Aims {
                 key_rows[axis][place] = direction[axis];
             }
         }
-        let key_cone = Cone::around(&key);
+        // Every point sees a lamp in directions of its own.
+        let far = lights.key.lamp.is_none() && !key.is_empty();
+        let key_cone = if far { Cone::around(&key) } else { None };
         let fill_rays = 2 * lights.occlusion_rays;
         let mut fill = Vec::new();
         for quarter in 0..4 {
@@ -70,6 +76,7 @@ impl Aims {
         Self {
             samples,
             key_rows,
+            key_parts,
             key,
             key_rays: key_rays as usize,
             key_cone,
@@ -110,6 +117,12 @@ impl Aims {
         self.key[place]
     }
 
+    /// The direction of a place towards a lamp, as seen from one point.
+    pub fn toward(&self, place: usize, toward: Toward) -> Vec3 {
+        let (area, turn) = self.key_parts[place];
+        Cap::new(toward.direction, toward.cos_half_angle).direction(area, turn)
+    }
+
     /// The occlusion directions of a quarter and a sample.
     #[inline(always)]
     pub fn fill_set(&self, quarter: u32, sample: u32) -> &[Vec3] {
@@ -144,13 +157,13 @@ impl Cap {
 /// The golden angle, in turns.
 const GOLDEN_TURN: f32 = 0.381_966;
 
-/// The direction to part `place` of `places` of a round light: parts of equal area along a Fibonacci
-/// spiral, turned as a whole.
-fn key_direction(light: &Cap, turn: u32, (place, places): (u32, u32)) -> Vec3 {
+/// Part `place` of `places` of a round light: parts of equal area along a Fibonacci spiral, turned as a
+/// whole.
+fn key_part(turn: u32, (place, places): (u32, u32)) -> (f32, f32) {
     // Within its part, each turn looks at another ring.
     let within = (turn.wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
     let area = (place as f32 + within) / places as f32;
-    light.direction(area, place as f32 * GOLDEN_TURN + turn as f32 / TURNS as f32)
+    (area, place as f32 * GOLDEN_TURN + turn as f32 / TURNS as f32)
 }
 
 /// Direction `place` of `places` over the sphere, for pixels of one quarter: the middles of parts of
@@ -184,8 +197,10 @@ mod tests {
     fn key_directions_stay_within_the_light_and_fill_it() {
         let light = Cap::new(Vec3::new(0.6, 0.0, 0.8), 0.9);
         for turn in 0..TURNS {
-            let all: Vec<Vec3> =
-                (0..64).map(|place| key_direction(&light, turn, (place, 64))).collect();
+            let all: Vec<Vec3> = (0..64)
+                .map(|place| key_part(turn, (place, 64)))
+                .map(|(area, around)| light.direction(area, around))
+                .collect();
             assert!(all.iter().all(|d| d.dot(light.axis) > 0.9 - 1e-5));
             let mean = all.iter().map(|d| d.dot(light.axis)).sum::<f32>() / 64.0;
             assert!((mean - 0.95).abs() < 0.005, "{mean}");

@@ -94,11 +94,9 @@ impl Hits {
         let dy = f32x16::from_slice(simd, &rays.direction[1][lanes.clone()]);
         let dz = f32x16::from_slice(simd, &rays.direction[2][lanes.clone()]);
         let (ox, oy, oz) = match rays.eye {
-            Some(eye) => (
-                f32x16::splat(simd, eye.x),
-                f32x16::splat(simd, eye.y),
-                f32x16::splat(simd, eye.z),
-            ),
+            Some(eye) => {
+                (f32x16::splat(simd, eye.x), f32x16::splat(simd, eye.y), f32x16::splat(simd, eye.z))
+            }
             None => (
                 f32x16::from_slice(simd, &rays.origin[0][lanes.clone()]),
                 f32x16::from_slice(simd, &rays.origin[1][lanes.clone()]),

@@ -26,6 +26,8 @@ mod picture;
 mod project;
 pub mod reference;
 mod render;
+#[cfg(test)]
+mod secondary_tests;
 mod shade;
 mod shaft;
 mod tile;

@@ -60,7 +60,8 @@ impl Shelves {
         };
         for (i, group) in boxes.iter().enumerate() {
             for axis in 0..3 {
-                shelves.low[axis][i] = group.low[axis].iter().copied().fold(f32::INFINITY, f32::min);
+                shelves.low[axis][i] =
+                    group.low[axis].iter().copied().fold(f32::INFINITY, f32::min);
                 shelves.high[axis][i] =
                     group.high[axis].iter().copied().fold(f32::NEG_INFINITY, f32::max);
             }
@@ -121,12 +122,7 @@ impl Near {
         // What rounding of coordinates and distances may hide.
         let reach = reach + 1e-5 * (reach + low.abs().max(high.abs()).max_element());
         for first in (0..shelves.boxes.len()).step_by(LANES) {
-            let (within, distance2) = apart(
-                simd,
-                shelves.rows(),
-                first,
-                (low, high, reach),
-            );
+            let (within, distance2) = apart(simd, shelves.rows(), first, (low, high, reach));
             let mut left = within;
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
@@ -134,12 +130,7 @@ impl Near {
                 let group = &shelves.boxes[first + lane];
                 let mut blocks = 0;
                 for part in (0..GROUP).step_by(LANES) {
-                    let (within, _) = apart(
-                        simd,
-                        group.rows(),
-                        part,
-                        (low, high, reach),
-                    );
+                    let (within, _) = apart(simd, group.rows(), part, (low, high, reach));
                     blocks |= within << part;
                 }
                 if blocks != 0 {
@@ -189,8 +180,8 @@ fn apart<S: Simd>(
     let mut square = zero;
     for axis in 0..3 {
         let below = f32x16::from_slice(simd, &rows.low[axis][first..first + LANES]) - high[axis];
-        let above =
-            f32x16::splat(simd, low[axis]) - f32x16::from_slice(simd, &rows.high[axis][first..first + LANES]);
+        let above = f32x16::splat(simd, low[axis])
+            - f32x16::from_slice(simd, &rows.high[axis][first..first + LANES]);
         let gap = below.max(above).max(zero);
         square = gap.mul_add(gap, square);
     }

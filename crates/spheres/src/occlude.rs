@@ -24,7 +24,7 @@ use crate::near::Near;
 use crate::packet::LANES;
 use crate::render::View;
 use crate::shade::Reaching;
-use crate::shaft::{Bundle, LOST};
+use crate::shaft::{Bundle, Cone, LOST};
 use crate::tile::{RayTile, TILE_RAYS};
 use crate::traverse::Counts;
 
@@ -52,6 +52,14 @@ pub(crate) struct Work<'a> {
 }
 
 impl Work<'_> {
+    /// Where the directions of the shadow rays of a hit begin.
+    #[inline(always)]
+    fn key_set(&self, ray: usize) -> usize {
+        let (x, y) = self.rays.pattern.pixel_of(ray);
+        let turn = turn(self.corner.0 + x, self.corner.1 + y);
+        self.aims.key_set(turn, self.first_sample + self.rays.pattern.sample(ray))
+    }
+
     /// Which of the four sets of occlusion directions the hit of a ray has: by its place in a square of
     /// two by two pixels, but on a sphere so small that no bands can show on it, and in a pixel with many
     /// samples, always the first. One set for all keeps beams full.
@@ -157,9 +165,29 @@ impl Occluder {
             let nx = f32x16::from_slice(simd, &hits.normal[0][lanes.clone()]);
             let ny = f32x16::from_slice(simd, &hits.normal[1][lanes.clone()]);
             let nz = f32x16::from_slice(simd, &hits.normal[2][lanes.clone()]);
+            if light.lamp.is_some() {
+                self.open_to_lamp(simd, hits, light, block);
+                one.store_slice(&mut self.reaching.fill[lanes]);
+                continue;
+            }
             let cosine = nz * d.z + ny * d.y + nx * d.x;
-            lit(simd, cosine, sine).store_slice(&mut self.reaching.key[lanes.clone()]);
+            lit(simd, cosine, f32x16::splat(simd, sine))
+                .store_slice(&mut self.reaching.key[lanes.clone()]);
             one.store_slice(&mut self.reaching.fill[lanes]);
+        }
+    }
+
+    /// What reaches the hits of a block from a lamp, which each of them sees elsewhere.
+    #[cold]
+    fn open_to_lamp<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight, block: usize) {
+        let mut left = hits.mask[block];
+        while left != 0 {
+            let ray = block * LANES + left.trailing_zeros() as usize;
+            left &= left - 1;
+            let toward = light.seen_from(hits.position_of(ray));
+            let cosine = f32x16::splat(simd, hits.normal_of(ray).dot(toward.direction));
+            let sine = (1.0 - toward.cos_half_angle * toward.cos_half_angle).max(1e-12).sqrt();
+            self.reaching.key[ray] = lit(simd, cosine, f32x16::splat(simd, sine))[0];
         }
     }
 
@@ -229,62 +257,11 @@ impl Occluder {
         for (_, ray) in &self.order[from..to] {
             self.points.push(work, *ray);
         }
-        let Some(cone) = &work.aims.key_cone else { return };
-        let rays = work.aims.key_rays;
-        self.bundle.clear();
         self.points.pad();
         self.points.clear_sums();
-        self.cosine.clear();
-        let whole = work.aims.key_whole();
-        let mut staged = Staged::new();
-        for point in 0..self.points.count {
-            let (origin, normal) = self.points.get(point);
-            let ray = self.points.ray[point] as usize;
-            let (x, y) = work.rays.pattern.pixel_of(ray);
-            let first = work.aims.key_set(
-                turn(work.corner.0 + x, work.corner.1 + y),
-                work.first_sample + work.rays.pattern.sample(ray),
-            );
-            if whole {
-                for first in (first..first + rays).step_by(LANES) {
-                    let toward = work.aims.key_sixteen(simd, first);
-                    self.send(simd, (origin, normal), toward);
-                }
-                continue;
-            }
-            for place in first..first + rays {
-                let direction = work.aims.key_direction(place);
-                let cosine = direction.dot(normal);
-                if cosine > 0.0 {
-                    staged.push(origin, direction, (cosine, point));
-                    if staged.count == LANES {
-                        staged.flush(simd, &mut self.bundle, f32::INFINITY);
-                    }
-                }
-            }
-        }
-        staged.flush(simd, &mut self.bundle, f32::INFINITY);
-        let bounds = self.points.bounds(0, self.points.count);
-        let systems = work.view.systems;
-        self.bundle.block(simd, (cone, bounds, f32::INFINITY), systems, counts);
-        if whole {
-            let vectors = rays / LANES;
-            for point in 0..self.points.count {
-                for vector in point * vectors..(point + 1) * vectors {
-                    let lanes = vector * LANES..(vector + 1) * LANES;
-                    let cosine = f32x16::from_slice(simd, &self.cosine[lanes]);
-                    let zero = f32x16::splat(simd, 0.0);
-                    self.points.all[point] += cosine.reduce_sum();
-                    let open = self.bundle.open(simd, vector).select(cosine, zero);
-                    self.points.visible[point] += open.reduce_sum();
-                }
-            }
-        }
-        for (i, (cosine, point)) in staged.own.iter().enumerate() {
-            self.points.all[*point as usize] += cosine;
-            if self.bundle.is_open(i) {
-                self.points.visible[*point as usize] += cosine;
-            }
+        match &work.aims.key_cone {
+            Some(cone) if work.aims.key_whole() => self.shoot_sixteens(simd, work, cone, counts),
+            _ => self.shoot(simd, work, (0, self.points.count), counts),
         }
         for point in 0..self.points.count {
             let ray = self.points.ray[point] as usize;
@@ -293,14 +270,121 @@ impl Occluder {
         }
     }
 
-    /// Sends sixteen rays of one point towards the light; those below its surface are none.
+    /// Shadow rays in whole vectors towards a far light.
     #[inline(always)]
-    fn send<S: Simd>(
+    fn shoot_sixteens<S: Simd>(
         &mut self,
         simd: S,
-        (origin, normal): (Vec3, Vec3),
-        toward: [f32x16<S>; 3],
+        work: Work<'_>,
+        cone: &Cone,
+        counts: &mut Counts,
     ) {
+        let rays = work.aims.key_rays;
+        self.bundle.clear();
+        self.cosine.clear();
+        for point in 0..self.points.count {
+            let at = self.points.get(point);
+            let first = work.key_set(self.points.ray[point] as usize);
+            for first in (first..first + rays).step_by(LANES) {
+                self.send(simd, at, work.aims.key_sixteen(simd, first));
+            }
+        }
+        let bounds = self.points.bounds(0, self.points.count);
+        self.bundle.block(simd, (cone, bounds, f32::INFINITY), work.view.systems, counts);
+        let vectors = rays / LANES;
+        for point in 0..self.points.count {
+            for vector in point * vectors..(point + 1) * vectors {
+                let lanes = vector * LANES..(vector + 1) * LANES;
+                let cosine = f32x16::from_slice(simd, &self.cosine[lanes]);
+                let zero = f32x16::splat(simd, 0.0);
+                self.points.all[point] += cosine.reduce_sum();
+                let open = self.bundle.open(simd, vector).select(cosine, zero);
+                self.points.visible[point] += open.reduce_sum();
+            }
+        }
+    }
+
+    /// Shadow rays of the points `from..to` towards any light, however many, in bundles as large as the
+    /// rays have an axis to follow.
+    fn shoot<S: Simd>(
+        &mut self,
+        simd: S,
+        work: Work<'_>,
+        (from, to): (usize, usize),
+        counts: &mut Counts,
+    ) {
+        let light = &work.view.lights.key;
+        self.bundle.clear();
+        let mut staged = Staged::default();
+        for point in from..to {
+            let (origin, normal) = self.points.get(point);
+            let first = work.key_set(self.points.ray[point] as usize);
+            let toward = light.seen_from(origin);
+            for place in first..first + work.aims.key_rays {
+                let direction = match light.lamp {
+                    Some(_) => work.aims.toward(place, toward),
+                    None => work.aims.key_direction(place),
+                };
+                let cosine = direction.dot(normal);
+                if cosine > 0.0 {
+                    let reach = toward.reach(direction.dot(toward.direction));
+                    staged.push(origin, (direction, reach), (cosine, point));
+                }
+            }
+        }
+        if staged.own.is_empty() {
+            return;
+        }
+        let known = work.aims.key_cone;
+        let Some(cone) = known.or_else(|| Cone::around(&staged.direction)) else {
+            let middle = from.midpoint(to);
+            if to - from > 1 {
+                self.shoot(simd, work, (from, middle), counts);
+                self.shoot(simd, work, (middle, to), counts);
+            } else {
+                self.shoot_singly(simd, work, &staged, counts);
+            }
+            return;
+        };
+        let reach = staged.fill(simd, &mut self.bundle);
+        let bounds = self.points.bounds(from, to);
+        self.bundle.block(simd, (&cone, bounds, reach), work.view.systems, counts);
+        for (ray, (cosine, point)) in staged.own.iter().enumerate() {
+            self.points.all[*point as usize] += cosine;
+            if self.bundle.is_open(ray) {
+                self.points.visible[*point as usize] += cosine;
+            }
+        }
+    }
+
+    /// Shadow rays of one point that go all ways, each for itself.
+    fn shoot_singly<S: Simd>(
+        &mut self,
+        simd: S,
+        work: Work<'_>,
+        staged: &Staged,
+        counts: &mut Counts,
+    ) {
+        for ray in 0..staged.own.len() {
+            let one = staged.single(ray);
+            self.bundle.clear();
+            let reach = one.fill(simd, &mut self.bundle);
+            let origin = one.origin[0];
+            if let Some(cone) = Cone::around(&one.direction) {
+                let bounds = (origin, origin);
+                self.bundle.block(simd, (&cone, bounds, reach), work.view.systems, counts);
+            }
+            let (cosine, point) = one.own[0];
+            self.points.all[point as usize] += cosine;
+            if self.bundle.is_open(0) {
+                self.points.visible[point as usize] += cosine;
+            }
+        }
+    }
+
+    /// Sends sixteen rays of one point towards the light; those below its surface are none.
+    #[inline(always)]
+    fn send<S: Simd>(&mut self, simd: S, (origin, normal): (Vec3, Vec3), toward: [f32x16<S>; 3]) {
         let [dx, dy, dz] = toward;
         let zero = f32x16::splat(simd, 0.0);
         let cosine = (dz * normal.z + dy * normal.y + dx * normal.x).max(zero);
@@ -308,8 +392,7 @@ impl Occluder {
         self.cosine.resize(at + LANES, 0.0);
         cosine.store_slice(&mut self.cosine[at..]);
         let above = cosine.simd_gt(zero);
-        let reach =
-            above.select(f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, LOST));
+        let reach = above.select(f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, LOST));
         let from = [
             f32x16::splat(simd, origin.x),
             f32x16::splat(simd, origin.y),
@@ -331,7 +414,8 @@ impl Occluder {
     ) {
         let (pattern, aims) = (work.rays.pattern, work.aims);
         let classes = 4 * pattern.samples;
-        let class_of = |ray: u32| work.quarter(ray as usize) * pattern.samples + pattern.sample(ray as usize);
+        let class_of =
+            |ray: u32| work.quarter(ray as usize) * pattern.samples + pattern.sample(ray as usize);
         let systems = work.view.systems;
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (_, ray) in &self.order[from..to] {
@@ -369,70 +453,70 @@ impl Occluder {
     }
 }
 
-/// Up to sixteen rays on their way into a bundle, and whose all that went before are.
+/// Rays on their way into a bundle, and whose they are.
+#[derive(Debug, Default)]
 struct Staged {
-    count: usize,
-    origin: [[f32; LANES]; 3],
-    direction: [[f32; LANES]; 3],
-    /// Cosine and point of every ray of the bundle.
+    origin: Vec<Vec3>,
+    direction: Vec<Vec3>,
+    reach: Vec<f32>,
+    /// Cosine and point.
     own: Vec<(f32, u32)>,
 }
 
 impl Staged {
-    fn new() -> Self {
-        Self {
-            count: 0,
-            origin: [[0.0; LANES]; 3],
-            direction: [[0.0; LANES]; 3],
-            own: Vec::new(),
-        }
-    }
-
     #[inline(always)]
-    fn push(&mut self, origin: Vec3, direction: Vec3, (cosine, point): (f32, usize)) {
-        for axis in 0..3 {
-            self.origin[axis][self.count] = origin[axis];
-            self.direction[axis][self.count] = direction[axis];
-        }
+    fn push(
+        &mut self,
+        origin: Vec3,
+        (direction, reach): (Vec3, f32),
+        (cosine, point): (f32, usize),
+    ) {
+        self.origin.push(origin);
+        self.direction.push(direction);
+        self.reach.push(reach);
         self.own.push((cosine, point as u32));
-        self.count += 1;
     }
 
-    /// Puts what there is into the bundle, as one vector.
+    /// Ray `ray` alone.
+    fn single(&self, ray: usize) -> Self {
+        Self {
+            origin: vec![self.origin[ray]],
+            direction: vec![self.direction[ray]],
+            reach: vec![self.reach[ray]],
+            own: vec![self.own[ray]],
+        }
+    }
+
+    /// Puts the rays into the bundle. Gives the greatest reach.
     #[inline(always)]
-    fn flush<S: Simd>(&mut self, simd: S, bundle: &mut Bundle, reach: f32) {
-        if self.count == 0 {
-            return;
-        }
-        let mut reaches = [reach; LANES];
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for lane in 0..LANES {
-            if lane < self.count {
-                let [x, y, z] = &self.origin;
-                let origin = Vec3::new(x[lane], y[lane], z[lane]);
-                (low, high) = (low.min(origin), high.max(origin));
-            } else {
-                reaches[lane] = LOST;
+    fn fill<S: Simd>(&self, simd: S, bundle: &mut Bundle) -> f32 {
+        let mut most = 0f32;
+        for first in (0..self.own.len()).step_by(LANES) {
+            let rays = LANES.min(self.own.len() - first);
+            let mut reach = [LOST; LANES];
+            let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            for lane in 0..rays {
+                let (o, d) = (self.origin[first + lane], self.direction[first + lane]);
+                for axis in 0..3 {
+                    (origin[axis][lane], direction[axis][lane]) = (o[axis], d[axis]);
+                }
+                reach[lane] = self.reach[first + lane];
+                most = most.max(reach[lane]);
+                (low, high) = (low.min(o), high.max(o));
             }
+            let around = (0.5 * (low + high), 0.5 * (high - low).length() * (1.0 + 1e-5));
+            let rows = |rows: &[[f32; LANES]; 3]| {
+                [
+                    f32x16::from_slice(simd, &rows[0]),
+                    f32x16::from_slice(simd, &rows[1]),
+                    f32x16::from_slice(simd, &rows[2]),
+                ]
+            };
+            let reach = f32x16::from_slice(simd, &reach);
+            bundle.push(rows(&origin), rows(&direction), reach, around);
         }
-        let around = (0.5 * (low + high), 0.5 * (high - low).length() * (1.0 + 1e-5));
-        let [ox, oy, oz] = &self.origin;
-        let [dx, dy, dz] = &self.direction;
-        bundle.push(
-            [
-                f32x16::from_slice(simd, ox),
-                f32x16::from_slice(simd, oy),
-                f32x16::from_slice(simd, oz),
-            ],
-            [
-                f32x16::from_slice(simd, dx),
-                f32x16::from_slice(simd, dy),
-                f32x16::from_slice(simd, dz),
-            ],
-            f32x16::from_slice(simd, &reaches),
-            around,
-        );
-        self.count = 0;
+        most
     }
 }
 
@@ -616,13 +700,12 @@ fn spread(v: u32) -> u32 {
     (v | v << 2) & 0x0924_9249
 }
 
-
 /// The part of a round light's strength that falls on a surface at cosine `cosine` from its middle.
 #[inline(always)]
-fn lit<S: Simd>(simd: S, cosine: f32x16<S>, sin_half_angle: f32) -> f32x16<S> {
+fn lit<S: Simd>(simd: S, cosine: f32x16<S>, sin_half_angle: f32x16<S>) -> f32x16<S> {
     let rising = (cosine + sin_half_angle).max(f32x16::splat(simd, 0.0));
-    let setting = rising * rising * (0.25 / sin_half_angle);
-    cosine.simd_ge(f32x16::splat(simd, sin_half_angle)).select(cosine, setting)
+    let setting = rising * rising * 0.25 / sin_half_angle;
+    cosine.simd_ge(sin_half_angle).select(cosine, setting)
 }
 
 #[cfg(test)]
@@ -633,7 +716,9 @@ mod tests {
     fn a_light_sets_smoothly() {
         let all = |cosine: f32, sine: f32| {
             let level = fearless_simd::Level::new();
-            fearless_simd::dispatch!(level, simd => lit(simd, f32x16::splat(simd, cosine), sine)[3])
+            fearless_simd::dispatch!(level, simd => {
+                lit(simd, f32x16::splat(simd, cosine), f32x16::splat(simd, sine))[3]
+            })
         };
         let s = 0.2;
         assert_eq!(all(1.0, s), 1.0);

@@ -100,11 +100,8 @@ fn view_of<S: Simd>(
         rect: [[0.0; GROUP]; 4],
     };
     let mut count = 0;
-    let mut boxes = Boxes {
-        middle: [[0.0; LANES]; 3],
-        half: [[0.0; LANES]; 3],
-        radius: [0.0; LANES],
-    };
+    let mut boxes =
+        Boxes { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3], radius: [0.0; LANES] };
     for index in group.blocks(&grid.lattice) {
         if visible.block(grid, index) == Seen::Hidden {
             continue;

@@ -7,8 +7,8 @@ use fearless_simd::{Level, Simd, dispatch};
 use fearless_simd_macros::simd;
 use motes_scene::{Lights, Rays};
 
-use crate::hits::Hits;
 use crate::aims::Aims;
+use crate::hits::Hits;
 use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
 use crate::packet::{MOST_RAYS, Packet};
@@ -212,11 +212,17 @@ impl<'a> Plan<'a> {
             rounds.push(pattern);
             left = &left[pattern.samples as usize..];
         }
-        let mut plan = Self { view, settings, rounds, groups: Vec::new(), shown: Vec::new(), aims: Aims::new(view.lights, settings.samples, view.systems) };
+        let mut plan = Self {
+            view,
+            settings,
+            rounds,
+            groups: Vec::new(),
+            shown: Vec::new(),
+            aims: Aims::new(view.lights, settings.samples, view.systems),
+        };
         if settings.primary == Primary::Project {
             for spheres in view.systems {
-                let groups =
-                    dispatch!(settings.level, simd => overview(simd, view.rays, spheres));
+                let groups = dispatch!(settings.level, simd => overview(simd, view.rays, spheres));
                 plan.shown.push(plan.shown_in(&groups));
                 plan.groups.push(groups);
             }

@@ -118,16 +118,19 @@ impl Cone {
             pad,
         };
         for side in 0..2 {
-            let (least, greatest) = self.slopes[side];
+            // Change per unit of travel.
+            let (least, greatest) = match (self.slopes[side], self.sign > 0.0) {
+                (slopes, true) => slopes,
+                ((least, greatest), false) => (-greatest, -least),
+            };
             let axis = axes[side + 1];
             // From the origin where the slope leads farthest aside.
-            let from = |slope: f32, outward: f32| match slope * self.sign * outward > 0.0 {
-                true => back,
-                false => front,
+            let from = |slope: f32, outward: f32| {
+                if slope * outward > 0.0 { back } else { front }
             };
             let at = |k: f32| {
-                let low = origins.0[axis] + (k - from(least, -1.0)) * least;
-                let high = origins.1[axis] + (k - from(greatest, 1.0)) * greatest;
+                let low = origins.0[axis] + (k - from(least, -1.0)) * self.sign * least;
+                let high = origins.1[axis] + (k - from(greatest, 1.0)) * self.sign * greatest;
                 (low, high)
             };
             let ((low0, high0), (low1, high1)) = (at(start), at(end));
@@ -319,12 +322,7 @@ impl<S: Simd> Walk<'_, S> {
 
     /// Culls and tests the particles `from..to`.
     #[inline(always)]
-    fn run(
-        &mut self,
-        simd: S,
-        (from, to): (usize, usize),
-        seen: Option<(&[u64], usize)>,
-    ) {
+    fn run(&mut self, simd: S, (from, to): (usize, usize), seen: Option<(&[u64], usize)>) {
         let mut slot = from;
         while slot < to {
             let count = (to - slot).min(LANES);
@@ -363,10 +361,14 @@ impl<S: Simd> Walk<'_, S> {
         let radius = f32x16::splat(simd, sphere.radius + self.frustum.pad);
         for first in (0..vectors).step_by(LANES) {
             let lanes = first..first + LANES;
-            let [mx, my, mz] = [&self.bundle.middle[0], &self.bundle.middle[1], &self.bundle.middle[2]];
-            let x = f32x16::splat(simd, sphere.center.x) - f32x16::from_slice(simd, &mx[lanes.clone()]);
-            let y = f32x16::splat(simd, sphere.center.y) - f32x16::from_slice(simd, &my[lanes.clone()]);
-            let z = f32x16::splat(simd, sphere.center.z) - f32x16::from_slice(simd, &mz[lanes.clone()]);
+            let [mx, my, mz] =
+                [&self.bundle.middle[0], &self.bundle.middle[1], &self.bundle.middle[2]];
+            let x =
+                f32x16::splat(simd, sphere.center.x) - f32x16::from_slice(simd, &mx[lanes.clone()]);
+            let y =
+                f32x16::splat(simd, sphere.center.y) - f32x16::from_slice(simd, &my[lanes.clone()]);
+            let z =
+                f32x16::splat(simd, sphere.center.z) - f32x16::from_slice(simd, &mz[lanes.clone()]);
             let size = f32x16::from_slice(simd, &self.bundle.spread[lanes]) + radius;
             let axis = self.cone.axis;
             let along = z * axis.z + y * axis.y + x * axis.x;
@@ -374,9 +376,8 @@ impl<S: Simd> Walk<'_, S> {
             let (x, y, z) = (x - along * axis.x, y - along * axis.y, z - along * axis.z);
             let aside2 = z.mul_add(z, y.mul_add(y, x * x));
             let limit = size * self.cone.inv_cos + along.max(zero) * self.cone.tan;
-            let meets = (along + size).simd_ge(zero)
-                & limit.simd_gt(zero)
-                & aside2.simd_le(limit * limit);
+            let meets =
+                (along + size).simd_ge(zero) & limit.simd_gt(zero) & aside2.simd_le(limit * limit);
             let mut meets = meets.to_bitmask();
             while meets != 0 {
                 let vector = first + meets.trailing_zeros() as usize;

@@ -159,9 +159,18 @@ impl RayTile {
             let at_y = (place.corner.1 + (block / SIDE_BLOCKS) as u32 * pattern.side) as f32;
             let a = (place_x + at_x - rays.center[0]) * pixel;
             let b = (f32x16::splat(simd, rays.center[1]) - (place_y + at_y)) * pixel;
-            let x = b.mul_add_precise(splat(simd, up.x), a.mul_add_precise(splat(simd, right.x), splat(simd, from.x)));
-            let y = b.mul_add_precise(splat(simd, up.y), a.mul_add_precise(splat(simd, right.y), splat(simd, from.y)));
-            let z = b.mul_add_precise(splat(simd, up.z), a.mul_add_precise(splat(simd, right.z), splat(simd, from.z)));
+            let x = b.mul_add_precise(
+                splat(simd, up.x),
+                a.mul_add_precise(splat(simd, right.x), splat(simd, from.x)),
+            );
+            let y = b.mul_add_precise(
+                splat(simd, up.y),
+                a.mul_add_precise(splat(simd, right.y), splat(simd, from.y)),
+            );
+            let z = b.mul_add_precise(
+                splat(simd, up.z),
+                a.mul_add_precise(splat(simd, right.z), splat(simd, from.z)),
+            );
             let lanes = block * LANES..(block + 1) * LANES;
             if perspective {
                 let length = z.mul_add_precise(z, y.mul_add_precise(y, x * x)).sqrt();

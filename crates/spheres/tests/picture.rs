@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, Radii, RadiusClasses, Visibility};
-use motes_scene::{Lights, Projection, Rays, Scene};
+use motes_scene::{Lamp, Lights, Projection, Rays, Scene};
 use motes_spheres::{Paint, Picture, Primary, Settings, Spheres, View, render};
 
 const SIZE: (u32, u32) = (96, 80);
@@ -226,4 +226,55 @@ fn the_world_can_be_far_from_its_origin() {
     let near = scene.resolve(bounds(DVec3::ZERO)).unwrap().view.rays(DVec3::ZERO);
     let away = scene.resolve(bounds(far)).unwrap().view.rays(far);
     assert!(near.origin.distance(away.origin) < 1e-6 * near.origin.length());
+}
+
+#[test]
+fn a_lamp_lights_and_shadows_from_where_it_is() {
+    // A lamp above the middle sphere, and another sphere half way to it.
+    let lamp = |radius: f32| {
+        lights(|l| {
+            l.key.lamp = Some(Lamp { center: DVec3::new(0.0, 0.0, 6.0), radius });
+            l.key.shadow_rays = 64;
+            l.occlusion_rays = 0;
+        })
+    };
+    let view = rays(Projection::Orthographic);
+    let ball = ([0.0; 3], 1.0);
+    let free = picture(&[ball], &lamp(0.1), &view, settings(1));
+    let middle = center_of(&free)[1];
+    assert!(middle > 0.5, "{middle}");
+    // What stands beyond the lamp takes nothing from it.
+    let beyond = picture(&[ball, ([0.0, 1.9, 7.5], 0.3)], &lamp(0.1), &view, settings(1));
+    assert_eq!(center_of(&beyond), center_of(&free));
+    // A sphere off the line of sight between lamp and ball shadows where the line through it leads: from
+    // (0, 0, 6) through (0, 0.3, 3.5) to the ball at about y = 0.62.
+    let before = picture(&[ball, ([0.0, 0.3, 3.5], 0.1)], &lamp(0.01), &view, settings(1));
+    let row = |picture: &Picture, y: f32| {
+        let row = (SIZE.1 as f32 / 2.0 - y * SIZE.1 as f32 / 4.0) as u32;
+        picture.color[(row * SIZE.0 + SIZE.0 / 2) as usize][1]
+    };
+    assert!(row(&before, 0.62) < 0.7 * row(&free, 0.62));
+    assert!((row(&before, -0.62) - row(&free, -0.62)).abs() < 1e-6);
+}
+
+#[test]
+fn light_from_everywhere_and_from_one_point_agrees_with_the_open() {
+    // Lights so wide that their rays share no axis.
+    for half_angle in [0.0f32, 30.0, 80.0, 179.0] {
+        for shadow_rays in [1, 16, 17] {
+            let wide = |shadows: u32| {
+                lights(|l| {
+                    l.key.cos_half_angle = half_angle.to_radians().cos();
+                    (l.key.shadow_rays, l.occlusion_rays) = (shadows, 0);
+                })
+            };
+            let view = rays(Projection::Perspective);
+            let alone = |shadows| picture(&[([0.0; 3], 1.5)], &wide(shadows), &view, settings(1));
+            // Nothing is in the way of a sphere's own light.
+            assert!(alone(shadow_rays).color == alone(0).color, "{half_angle}°, {shadow_rays}");
+            let covered = [([0.0; 3], 1.0), ([0.0, 0.0, 1.2], 1.9)];
+            let seen = picture(&covered, &wide(shadow_rays), &view, settings(1));
+            assert!(seen.color.iter().all(|c| c.iter().all(|v| v.is_finite())));
+        }
+    }
 }
