@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::{Group, Lattice};
+use crate::{Group, Lattice, Pages};
 
 /// Radii of particles, all equal or one each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,11 +63,11 @@ pub struct Grid {
     /// The groups of blocks that hold particles, x fastest.
     pub groups: Vec<Group>,
     /// First particle of each cell, block after block, and the number of particles at the end.
-    pub cell_starts: Vec<u32>,
+    pub cell_starts: Pages<u32>,
     /// The particles in cell order.
-    pub particles: Vec<Particle>,
+    pub particles: Pages<Particle>,
     /// Radii in cell order.
-    pub radius: Radii,
+    pub radius: Radii<Pages<f32>>,
     /// Least coordinates of all centres; +∞ without particles.
     pub low: Vec3,
     /// Greatest coordinates of all centres; −∞ without particles.

@@ -4,6 +4,8 @@
 
 use glam::Vec3;
 
+use crate::places::Places;
+
 /// The lattice of cubic blocks that covers the particles' centres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
@@ -21,18 +23,19 @@ const MOST_BLOCKS_PER_AXIS: f64 = (1 << 20) as f64;
 impl Lattice {
     /// Covers `low..high` with blocks so that there are about `blocks` of them.
     pub fn with_blocks(low: Vec3, high: Vec3, blocks: f64) -> Self {
-        let edge = edge_for_count((high - low).to_array().map(f64::from), blocks.max(1.0));
+        let extent = (high.as_dvec3() - low.as_dvec3()).to_array();
+        let edge = edge_for_count(extent, blocks.max(1.0));
         Self::with_edge(low, high, edge)
     }
 
     /// Covers `low..high` with blocks of the given edge; it grows where more than 2²⁰ would fit
     /// along an axis.
     pub fn with_edge(low: Vec3, high: Vec3, edge: f64) -> Self {
-        let extent = (high - low).to_array().map(f64::from);
+        let extent = (high.as_dvec3() - low.as_dvec3()).to_array();
         let longest = extent.into_iter().fold(0.0, f64::max);
         let edge = edge.max(longest / MOST_BLOCKS_PER_AXIS).max(f64::from(f32::MIN_POSITIVE));
         // A hair wider, so that the greatest coordinate falls inside the last block.
-        let edge = (edge * (1.0 + 1e-6)) as f32;
+        let edge = ((edge * (1.0 + 1e-6)) as f32).min(f32::MAX);
         let dims = extent.map(|e| ((e / f64::from(edge)).ceil() as u32).max(1));
         Self { low, edge, dims }
     }
@@ -44,9 +47,7 @@ impl Lattice {
 
     /// The block along each axis that holds point `p`; points outside fall into the nearest block.
     pub fn block_of(&self, p: Vec3) -> [u32; 3] {
-        let at = (p - self.low) / self.edge;
-        // `as` truncates, saturates and sends NaN to zero.
-        std::array::from_fn(|i| (at[i] as u32).min(self.dims[i] - 1))
+        Places::of_blocks(self).along(p.to_array())
     }
 
     /// The position of a block in the list of blocks: x fastest.

@@ -11,12 +11,17 @@
 //! - The same particles give the same grid, bit for bit, for any number of threads.
 
 mod build;
+mod cells;
 mod classes;
 mod grid;
 mod groups;
 mod lattice;
 mod neighbors;
+mod pages;
+mod places;
 mod ranges;
+mod scatter;
+mod sort;
 mod visibility;
 
 pub use build::{Params, Resolution};
@@ -24,5 +29,6 @@ pub use classes::RadiusClasses;
 pub use grid::{Block, Grid, Particle, Radii};
 pub use groups::{GROUP_EDGE, Group};
 pub use lattice::Lattice;
+pub use pages::Pages;
 pub use ranges::BlockRanges;
 pub use visibility::{Filter, Seen, Visibility};

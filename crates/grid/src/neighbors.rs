@@ -3,6 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::places::Places;
 use crate::{Block, Grid, Radii};
 
 /// How many particles the median spacing is taken over.
@@ -30,16 +31,14 @@ impl Grid {
     }
 
     fn visit_cells(&self, block: &Block, low: Vec3, high: Vec3, visit: &mut impl FnMut(usize)) {
-        let cell = |p: Vec3, axis: usize| {
-            let at = (p[axis] - block.cell_low[axis]) / block.cell_edge;
-            (at as u32).min(block.cells[axis] - 1)
-        };
+        let places = Places::of_cells(block);
+        let (low, high) = (places.along(low.to_array()), places.along(high.to_array()));
         let [nx, ny, _] = block.cells;
-        for z in cell(low, 2)..=cell(high, 2) {
-            for y in cell(low, 1)..=cell(high, 1) {
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
                 let row = (block.first_cell + (z * ny + y) * nx) as usize;
-                let from = self.cell_starts[row + cell(low, 0) as usize];
-                let to = self.cell_starts[row + cell(high, 0) as usize + 1];
+                let from = self.cell_starts[row + low[0] as usize];
+                let to = self.cell_starts[row + high[0] as usize + 1];
                 (from as usize..to as usize).for_each(&mut *visit);
             }
         }

@@ -149,6 +149,34 @@ fn any_number_of_threads_builds_the_same_grid() {
 }
 
 #[test]
+fn a_grid_in_the_memory_of_another_is_the_same_grid() {
+    let radii: Vec<f32> = random(60_000, 30).iter().map(|r| 0.001 + 0.002 * r).collect();
+    let mut grid = Grid::empty();
+    for (n, seed) in [(60_000, 20), (50_000, 21), (60_000, 22), (10, 23), (0, 24), (40_000, 25)] {
+        let positions = cloud(n, seed);
+        let radii = Radii::Each(&radii[..n]);
+        grid = grid.rebuild(&positions, radii, None, Params::default());
+        let anew = Grid::build(positions, radii, None, Params::default());
+        assert!(grid.particles == anew.particles && grid.cell_starts == anew.cell_starts);
+        assert!(grid.radius == anew.radius && grid.blocks == anew.blocks);
+        assert!(grid.groups == anew.groups && grid.low == anew.low && grid.high == anew.high);
+    }
+}
+
+#[test]
+fn particles_of_a_cell_keep_the_order_of_the_file() {
+    let positions = cloud(100_000, 26);
+    let grid = build(&positions);
+    for cell in grid.cell_starts.windows(2) {
+        assert!(grid.particles[cell[0] as usize..cell[1] as usize].is_sorted_by_key(|p| p.index));
+    }
+    // All in one bucket, and more than any cache holds.
+    let mut far = cloud(400_000, 27);
+    far[9] = [1e7, 0.0, 0.0];
+    build(&far);
+}
+
+#[test]
 fn a_grid_by_cell_length_has_cells_of_that_length() {
     let positions = cloud(10_000, 11);
     let params = Params { resolution: Resolution::CellEdge(0.05), block_cells: 4 };
