@@ -14,6 +14,7 @@
 mod annotate;
 mod error;
 mod info;
+mod opacity;
 mod open;
 mod paint;
 mod picture;

@@ -168,6 +168,8 @@ fn check_system(system: &System, index: usize) -> Result<()> {
     let (scale, radius) = (system.radius_scale, system.radius);
     need(&at("radius_scale"), scale, positive(scale), "a number above 0")?;
     need(&at("radius"), radius, radius.is_none_or(positive), "a number above 0")?;
+    let opacity = system.opacity;
+    need(&at("opacity"), opacity, (0.0..=1.0).contains(&opacity), "a number in 0 to 1")?;
     for (name, r) in &system.radii {
         need(&at(&format!("radii.{name}")), r, positive(*r), "a number above 0")?;
     }
@@ -285,6 +287,7 @@ mod tests {
             (&["light.direction=0,0,0"], "light.direction"),
             (&["light.softness=-1"], "light.softness"),
             (&["system.radius=0"], "system.0.radius"),
+            (&["system.opacity=1.5"], "system.0.opacity"),
             (&["system.radius_scale=inf"], "system.0.radius_scale"),
             (&["system.radii.Na=-1"], "system.0.radii.Na"),
             (&["system.color.range=0,1", "system.color.log=true"], "system.0.color.range"),

@@ -21,7 +21,7 @@ use crate::aims::{Aims, TURNS};
 use crate::beam::{Beam, MOST};
 use crate::hits::Hits;
 use crate::near::Near;
-use crate::packet::LANES;
+use crate::packet::{LANES, Packet};
 use crate::render::View;
 use crate::shade::Reaching;
 use crate::shaft::{Bundle, LOST};
@@ -52,6 +52,7 @@ pub(crate) struct Work<'a> {
 #[derive(Debug)]
 pub(crate) struct Occluder {
     pub reaching: Reaching,
+    pub(crate) packet: Box<Packet>,
     bundle: Bundle,
     beam: Beam,
     near: Near,
@@ -59,15 +60,15 @@ pub(crate) struct Occluder {
     order: Vec<(u32, u32)>,
     points: Points,
     /// Sums over each hit's rays, of visible · cosine and of cosine.
-    key: Sums,
-    fill: Sums,
+    pub(crate) key: Sums,
+    pub(crate) fill: Sums,
 }
 
 /// Per ray of a tile, visible cosines and all cosines.
 #[derive(Debug)]
-struct Sums {
-    visible: Vec<f32>,
-    all: Vec<f32>,
+pub(crate) struct Sums {
+    pub visible: Vec<f32>,
+    pub all: Vec<f32>,
 }
 
 impl Sums {
@@ -80,6 +81,7 @@ impl Occluder {
     pub fn new() -> Self {
         Self {
             reaching: Reaching::new(),
+            packet: Box::new(Packet::new()),
             bundle: Bundle::new(),
             beam: Beam::new(),
             near: Near::default(),
@@ -123,7 +125,7 @@ impl Occluder {
     /// While the whole round light is above the horizon this is the cosine; while it sets, over ±sin α
     /// of the cosine, the quadratic that meets the cosine above and zero below with equal slopes.
     #[inline(always)]
-    fn open<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight) {
+    pub(crate) fn open<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight) {
         let sine = (1.0 - light.cos_half_angle * light.cos_half_angle).max(1e-12).sqrt();
         let d = light.direction;
         let one = f32x16::splat(simd, 1.0);
@@ -261,7 +263,7 @@ impl Occluder {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (_, ray) in &self.order[from..to] {
             let position = work.hits.position_of(*ray as usize);
-            let lift = Vec3::splat(Points::lift(work, *ray as usize));
+            let lift = Vec3::splat(lift(work, *ray as usize));
             (low, high) = (low.min(position - lift), high.max(position + lift));
         }
         self.near.find(simd, &aims.shelves, (low, high), aims.reach);
@@ -305,12 +307,7 @@ struct Staged {
 
 impl Staged {
     fn new() -> Self {
-        Self {
-            count: 0,
-            origin: [[0.0; LANES]; 3],
-            direction: [[0.0; LANES]; 3],
-            own: Vec::new(),
-        }
+        Self { count: 0, origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], own: Vec::new() }
     }
 
     #[inline(always)]
@@ -392,21 +389,13 @@ impl Points {
     fn push(&mut self, work: Work<'_>, ray: u32) {
         let at = ray as usize;
         let (position, normal) = (work.hits.position_of(at), work.hits.normal_of(at));
-        let origin = position + normal * Self::lift(work, at);
+        let origin = position + normal * lift(work, at);
         for axis in 0..3 {
             self.origin[axis].push(origin[axis]);
             self.normal[axis].push(normal[axis]);
         }
         self.ray.push(ray);
         self.count += 1;
-    }
-
-    /// How far from its surface the rays of a hit start: a thousandth of the radius, and what rounding of
-    /// the coordinates may add to it.
-    #[inline(always)]
-    fn lift(work: Work<'_>, ray: usize) -> f32 {
-        let size = work.hits.position_of(ray).abs().max_element() + work.rays.distance[ray];
-        1e-3 * work.hits.radius[ray] + 1e-6 * size
     }
 
     fn get(&self, point: usize) -> (Vec3, Vec3) {
@@ -491,9 +480,17 @@ impl Points {
     }
 }
 
+/// How far from its surface the rays of a hit start: a thousandth of the radius, and what rounding of
+/// the coordinates may add to it.
+#[inline(always)]
+pub(crate) fn lift(work: Work<'_>, ray: usize) -> f32 {
+    let size = work.hits.position_of(ray).abs().max_element() + work.rays.distance[ray];
+    1e-3 * work.hits.radius[ray] + 1e-6 * size
+}
+
 /// Turns sums into visible parts, which the hits of a square of two by two pixels (of a pixel, if it
 /// fills a block) on the same sphere share. `times` what is there already, or instead of it.
-fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
+pub(crate) fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
     let (hits, rays) = (work.hits, work.rays);
     let squares: &[u16] = match rays.pattern.side {
         4 => &[0x0033, 0x00cc, 0x3300, 0xcc00],
@@ -528,7 +525,7 @@ fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
 }
 
 /// Which turn of the light's samples a pixel has: neighbours lie far apart (Roberts' R₂ sequence).
-fn turn(x: u32, y: u32) -> u32 {
+pub(crate) fn turn(x: u32, y: u32) -> u32 {
     let at = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5));
     at >> (32 - TURNS.ilog2())
 }
@@ -540,7 +537,6 @@ fn spread(v: u32) -> u32 {
     let v = (v | v << 4) & 0x030c_30c3;
     (v | v << 2) & 0x0924_9249
 }
-
 
 /// The part of a round light's strength that falls on a surface at cosine `cosine` from its middle.
 #[inline(always)]
