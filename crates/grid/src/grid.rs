@@ -76,7 +76,7 @@ pub struct Grid {
     pub least_radius: f32,
     /// Greatest radius of all (r_max of Gribble et al. 2007, §4.1).
     pub greatest_radius: f32,
-    /// Blocks in which particles coincide exactly; see [`crate::Visibility`].
+    /// Blocks in which particles coincide exactly; see [`crate::Visibility`]. Cleared, none hides another.
     pub crowded: Vec<u32>,
 }
 

@@ -15,6 +15,7 @@ mod annotate;
 pub mod bench;
 mod error;
 mod info;
+mod opacity;
 mod open;
 mod paint;
 mod picture;

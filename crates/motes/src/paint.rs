@@ -6,8 +6,9 @@ use glam::Vec3;
 use motes_particles::expression::Property;
 use motes_particles::read::names;
 use motes_particles::{Column, Particles, Values};
-use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, nearest};
+use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, System, nearest};
 
+use crate::opacity::Opacity;
 use crate::{Error, Result};
 
 /// What `color.by` can be besides the name of a property.
@@ -18,6 +19,8 @@ const WORDS: &[&str] = &["auto", "uniform", "element", "type", "chain"];
 pub(crate) struct Paint {
     particles: Arc<Particles>,
     how: How,
+    /// How much each particle hides.
+    pub opacity: Opacity,
     /// What the colours mean, for the legend.
     pub meaning: Meaning,
 }
@@ -91,16 +94,17 @@ fn component_number(component: Component) -> Option<usize> {
 }
 
 impl Paint {
-    /// The paint of `particles` under `coloring`; `range` overrides the frame's own range, such as the
+    /// The paint of `particles` as `system` says; `range` overrides the frame's own range, such as the
     /// whole series'.
     ///
     /// # Errors
     /// No such property or colour map.
     pub fn new(
         particles: &Arc<Particles>,
-        coloring: &Coloring,
+        system: &System,
         range: Option<[f64; 2]>,
     ) -> Result<Self> {
+        let coloring = &system.color;
         let (how, meaning) = match &coloring.by {
             ColorBy::Auto => automatic(particles, coloring),
             ColorBy::Uniform => uniform(coloring),
@@ -114,7 +118,12 @@ impl Paint {
             }
             ColorBy::Property(name) => by_property(particles, coloring, name, range)?,
         };
-        Ok(Self { particles: particles.clone(), how, meaning })
+        let own_color = match how {
+            How::Own { column, .. } => Some(&particles.columns[column]),
+            _ => None,
+        };
+        let opacity = Opacity::new(particles, own_color, system.opacity);
+        Ok(Self { particles: particles.clone(), how, opacity, meaning })
     }
 
     /// The one colour of all particles, if they have one.

@@ -12,6 +12,7 @@ use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Resolved, Scene, 
 use motes_spheres::{Center, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
+use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
@@ -349,6 +350,14 @@ impl motes_spheres::Paint for Paints<'_> {
     fn uniform(&self, system: u16) -> Option<Vec3> {
         self.0[system as usize].paint.uniform()
     }
+
+    fn opacity(&self, system: u16, index: u32) -> f32 {
+        self.0[system as usize].paint.opacity.of(index)
+    }
+
+    fn translucent(&self) -> bool {
+        self.0.iter().any(|l| !l.paint.opacity.is_opaque())
+    }
 }
 
 /// Makes a path absolute, so that a picture can be drawn again from any directory.
@@ -366,7 +375,7 @@ fn milliseconds(since: Instant) -> f64 {
 /// The columns that colours and radii need; all, where a property's name or an expression may mean any.
 pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     let by = match &system.color.by {
-        ColorBy::Auto => vec![names::COLOR],
+        ColorBy::Auto => vec![names::COLOR, ALPHA],
         ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
         ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
         ColorBy::Property(_) => return Wanted::All,
@@ -374,7 +383,12 @@ pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     if !system.r#where.trim().is_empty() || !system.filter.is_empty() {
         return Wanted::All;
     }
-    Wanted::Only(by.into_iter().chain([names::PARTICLE_TYPE]).map(str::to_owned).collect())
+    Wanted::Only(
+        by.into_iter()
+            .chain([names::PARTICLE_TYPE, names::TRANSPARENCY])
+            .map(str::to_owned)
+            .collect(),
+    )
 }
 
 /// The range of the colouring property over all frames.

@@ -43,7 +43,7 @@ impl Loaded {
         };
         let scale = system.radius_scale as f32;
         let shift = DVec3::from_array(particles.origin) - origin;
-        let classes = if shift == DVec3::ZERO {
+        let mut classes = if shift == DVec3::ZERO {
             radius::classes(&particles.positions, rule, scale, params)
         } else {
             let about = |p: &[f32; 3]| (Vec3::from_array(*p).as_dvec3() + shift).as_vec3();
@@ -51,8 +51,12 @@ impl Loaded {
                 particles.positions.iter().map(|p| about(p).to_array()).collect();
             radius::classes(&positions, rule, scale, params)
         };
+        let paint = Paint::new(&particles, system, range)?;
+        if !paint.opacity.is_opaque() {
+            // What is translucent hides nothing that coincides with it.
+            classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
+        }
         let visible = visibility(&particles, &classes, system)?;
-        let paint = Paint::new(&particles, &system.color, range)?;
         let sim_box = box_shown(&particles, scene.overlay.r#box);
         Ok(Self { number, particles, sim_box, classes, visible, paint })
     }

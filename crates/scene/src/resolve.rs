@@ -104,6 +104,8 @@ fn check_system(system: &System, index: usize) -> Result<()> {
     let (scale, radius) = (system.radius_scale, system.radius);
     need(&at("radius_scale"), scale, positive(scale), "a number above 0")?;
     need(&at("radius"), radius, radius.is_none_or(positive), "a number above 0")?;
+    let opacity = system.opacity;
+    need(&at("opacity"), opacity, (0.0..=1.0).contains(&opacity), "a number in 0 to 1")?;
     for (name, r) in &system.radii {
         need(&at(&format!("radii.{name}")), r, positive(*r), "a number above 0")?;
     }
@@ -274,6 +276,7 @@ mod tests {
             (&["film.fps=0"], "film.fps"),
             (&["film.quality=101"], "film.quality"),
             (&["system.radius=0"], "system.0.radius"),
+            (&["system.opacity=1.5"], "system.0.opacity"),
             (&["system.radius_scale=inf"], "system.0.radius_scale"),
             (&["system.radii.Na=-1"], "system.0.radii.Na"),
             (&["system.color.range=0,1", "system.color.log=true"], "system.0.color.range"),

@@ -51,6 +51,8 @@ settings! {
         filter: Vec<Filter> = Vec::new(),
         /// How the particles are coloured.
         color: Coloring = Coloring::default(),
+        /// Factor on every opacity, 0 (unseen) to 1: 1 − the file's transparency, times the alpha of its colours where they are shown.
+        opacity: f64 = 1.0,
     }
 }
 

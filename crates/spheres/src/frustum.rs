@@ -69,7 +69,12 @@ impl Frustum {
         // divided by the least slope of a ray along K.
         let pad = reach * 2e-6;
         let (near, far) = if sign > 0.0 { (low[k], high[k]) } else { (high[k], low[k]) };
-        let nearest_origin = ok.iter().map(|o| o * sign).fold(f32::INFINITY, f32::min) * sign;
+        let mut nearest_origin = ok.iter().map(|o| o * sign).fold(f32::INFINITY, f32::min) * sign;
+        if packet.peels {
+            // Nothing before what the rays have met is looked for.
+            let met = (0..lanes).map(|i| (ok[i] + packet.after[i] * dk[i]) * sign);
+            nearest_origin = met.fold(f32::INFINITY, f32::min) * sign;
+        }
         let start = (near * sign).max(nearest_origin * sign) * sign - sign * (radius + pad);
         let end = far + sign * (radius + pad);
         if (end - start) * sign <= 0.0 {

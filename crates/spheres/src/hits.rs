@@ -7,7 +7,7 @@ use motes_grid::{Particle, Radii};
 
 use crate::intersect::transposed;
 use crate::lanes::Lanes;
-use crate::packet::{LANES, NO_SLOT};
+use crate::packet::{LANES, NO_SLOT, Surface};
 use crate::render::Center;
 use crate::tile::{RayTile, TILE_RAYS};
 use crate::traverse::Spheres;
@@ -138,9 +138,28 @@ impl Hits {
         Vec3::new(self.normal[0][ray], self.normal[1][ray], self.normal[2][ray])
     }
 
+    /// The rays that have hit something.
+    pub fn rays(&self) -> impl Iterator<Item = usize> {
+        (0..TILE_RAYS).filter(|ray| self.has(*ray))
+    }
+
+    /// Whether ray `ray` has hit something.
+    pub fn has(&self, ray: usize) -> bool {
+        self.mask[ray / LANES] >> (ray % LANES) & 1 == 1
+    }
+
+    /// The surface that ray `ray` has hit.
+    pub fn surface(&self, rays: &RayTile, ray: usize) -> Surface {
+        Surface {
+            distance: rays.distance[ray],
+            system: rays.hit_system[ray],
+            index: self.index[ray],
+        }
+    }
+
     /// What ray `ray` has hit.
     pub fn center(&self, rays: &RayTile, ray: usize) -> Center {
-        if self.mask[ray / LANES] >> (ray % LANES) & 1 == 0 {
+        if !self.has(ray) {
             return Center::NOTHING;
         }
         Center {

@@ -76,7 +76,14 @@ pub fn intersect<S: Simd>(
         let ox = cx - load(simd, &packet.origin[0], first);
         let oy = cy - load(simd, &packet.origin[1], first);
         let oz = cz - load(simd, &packet.origin[2], first);
-        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+        let (distance, mut hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+        if packet.peels {
+            let after = load(simd, &packet.after, first);
+            let at_it = (hit & distance.simd_eq(after)).to_bitmask();
+            let follow = following(packet, sphere.slot, (first, at_it), index_of);
+            let follow = mask32x16::from_bitmask(simd, follow);
+            hit &= distance.simd_gt(after) | follow;
+        }
         let nearer = hit & distance.simd_lt(before);
         let ties = (hit & distance.simd_eq(before)).to_bitmask();
         if packet.any_hit {
@@ -97,6 +104,75 @@ pub fn intersect<S: Simd>(
         }
         if ties != 0 {
             break_ties(packet, sphere.slot, (first, ties), index_of);
+        }
+    }
+    any
+}
+
+/// Which of the rays that meet the sphere just where they met another come to it after that one.
+fn following(
+    packet: &Packet,
+    slot: u32,
+    (first, at_it): (usize, u64),
+    index_of: &dyn Fn(u32) -> u32,
+) -> u64 {
+    let mut follow = 0;
+    for lane in (0..LANES).filter(|lane| at_it >> lane & 1 == 1) {
+        let later = (packet.system, index_of(slot)) > packet.after_sphere[first + lane];
+        follow |= u64::from(later) << lane;
+    }
+    follow
+}
+
+/// What lets less than e⁻⁹ ≈ 1/8000 of the light through is dark.
+const DARK: u32 = 9 << 16;
+
+/// The optical depth −ln(1 − opacity), in parts of 2¹⁶: whole numbers, whose sum is the same in any order.
+pub(crate) fn optical_depth(opacity: f32) -> u32 {
+    // `as` saturates: what is opaque has the greatest depth.
+    (-(1.0 - opacity.clamp(0.0, 1.0)).ln() * 65536.0).round().min(DARK as f32) as u32
+}
+
+/// The part of light that an optical depth lets through.
+pub(crate) fn transmittance(optical: u32) -> f32 {
+    if optical >= DARK { 0.0 } else { (-(optical as f32) / 65536.0).exp() }
+}
+
+/// Adds the optical depth of a sphere to all rays of the packet that meet it within their reach. Gives
+/// whether any went dark.
+#[simd]
+pub(crate) fn dim<S: Simd>(
+    simd: S,
+    packet: &mut Packet,
+    sphere: Sphere,
+    depth_of: &dyn Fn(u32) -> u32,
+) -> bool {
+    let center = sphere.center;
+    let cx = f32x16::splat(simd, center.x);
+    let cy = f32x16::splat(simd, center.y);
+    let cz = f32x16::splat(simd, center.z);
+    let r2 = f32x16::splat(simd, sphere.radius * sphere.radius);
+    let mut depth = None;
+    let mut any = false;
+    for first in (0..packet.lanes()).step_by(LANES) {
+        let reach = load(simd, &packet.distance, first);
+        let dx = load(simd, &packet.direction[0], first);
+        let dy = load(simd, &packet.direction[1], first);
+        let dz = load(simd, &packet.direction[2], first);
+        let ox = cx - load(simd, &packet.origin[0], first);
+        let oy = cy - load(simd, &packet.origin[1], first);
+        let oz = cz - load(simd, &packet.origin[2], first);
+        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+        let mut met = (hit & distance.simd_lt(reach)).to_bitmask();
+        while met != 0 {
+            let ray = first + met.trailing_zeros() as usize;
+            met &= met - 1;
+            let depth = *depth.get_or_insert_with(|| depth_of(sphere.slot));
+            packet.optical[ray] = packet.optical[ray].saturating_add(depth);
+            if packet.optical[ray] >= DARK {
+                packet.distance[ray] = BLOCKED;
+                any = true;
+            }
         }
     }
     any

@@ -15,13 +15,13 @@
 use fearless_simd::{f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_scene::{KeyLight, Projection};
+use motes_scene::{KeyLight, Projection, Toward};
 
 use crate::aims::{Aims, TURNS};
 use crate::beam::{Beam, MOST};
 use crate::hits::Hits;
 use crate::near::Near;
-use crate::packet::LANES;
+use crate::packet::{LANES, Packet};
 use crate::render::View;
 use crate::shade::Reaching;
 use crate::shaft::{Bundle, Cone, LOST};
@@ -52,9 +52,19 @@ pub(crate) struct Work<'a> {
 }
 
 impl Work<'_> {
+    /// Direction and reach of the shadow ray of a place, where the light is seen as `toward`.
+    #[inline(always)]
+    pub fn shadow_ray(&self, place: usize, toward: Toward) -> (Vec3, f32) {
+        let direction = match self.view.lights.key.lamp {
+            Some(_) => self.aims.toward(place, toward),
+            None => self.aims.key_direction(place),
+        };
+        (direction, toward.reach(direction.dot(toward.direction)))
+    }
+
     /// Where the directions of the shadow rays of a hit begin.
     #[inline(always)]
-    fn key_set(&self, ray: usize) -> usize {
+    pub fn key_set(&self, ray: usize) -> usize {
         let (x, y) = self.rays.pattern.pixel_of(ray);
         let turn = turn(self.corner.0 + x, self.corner.1 + y);
         self.aims.key_set(turn, self.first_sample + self.rays.pattern.sample(ray))
@@ -64,7 +74,7 @@ impl Work<'_> {
     /// two by two pixels, but on a sphere so small that no bands can show on it, and in a pixel with many
     /// samples, always the first. One set for all keeps beams full.
     #[inline(always)]
-    fn quarter(&self, ray: usize) -> u32 {
+    pub fn quarter(&self, ray: usize) -> u32 {
         let pixel = match self.view.rays.projection {
             Projection::Perspective => self.view.rays.pixel * self.rays.distance[ray],
             Projection::Orthographic => self.view.rays.pixel,
@@ -81,6 +91,7 @@ impl Work<'_> {
 #[derive(Debug)]
 pub(crate) struct Occluder {
     pub reaching: Reaching,
+    pub(crate) packet: Box<Packet>,
     bundle: Bundle,
     beam: Beam,
     near: Near,
@@ -90,15 +101,15 @@ pub(crate) struct Occluder {
     /// Cosines of the rays of a bundle.
     cosine: Vec<f32>,
     /// Sums over each hit's rays, of visible · cosine and of cosine.
-    key: Sums,
-    fill: Sums,
+    pub(crate) key: Sums,
+    pub(crate) fill: Sums,
 }
 
 /// Per ray of a tile, visible cosines and all cosines.
 #[derive(Debug)]
-struct Sums {
-    visible: Vec<f32>,
-    all: Vec<f32>,
+pub(crate) struct Sums {
+    pub visible: Vec<f32>,
+    pub all: Vec<f32>,
 }
 
 impl Sums {
@@ -111,6 +122,7 @@ impl Occluder {
     pub fn new() -> Self {
         Self {
             reaching: Reaching::new(),
+            packet: Box::new(Packet::new()),
             bundle: Bundle::new(),
             beam: Beam::new(),
             near: Near::default(),
@@ -156,7 +168,7 @@ impl Occluder {
     /// While the whole round light is above the horizon this is the cosine; while it sets, over ±sin α
     /// of the cosine, the quadratic that meets the cosine above and zero below with equal slopes.
     #[inline(always)]
-    fn open<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight) {
+    pub(crate) fn open<S: Simd>(&mut self, simd: S, hits: &Hits, light: &KeyLight) {
         let sine = (1.0 - light.cos_half_angle * light.cos_half_angle).max(1e-12).sqrt();
         let d = light.direction;
         let one = f32x16::splat(simd, 1.0);
@@ -321,13 +333,9 @@ impl Occluder {
             let first = work.key_set(self.points.ray[point] as usize);
             let toward = light.seen_from(origin);
             for place in first..first + work.aims.key_rays {
-                let direction = match light.lamp {
-                    Some(_) => work.aims.toward(place, toward),
-                    None => work.aims.key_direction(place),
-                };
+                let (direction, reach) = work.shadow_ray(place, toward);
                 let cosine = direction.dot(normal);
                 if cosine > 0.0 {
-                    let reach = toward.reach(direction.dot(toward.direction));
                     staged.push(origin, (direction, reach), (cosine, point));
                 }
             }
@@ -420,7 +428,7 @@ impl Occluder {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (_, ray) in &self.order[from..to] {
             let position = work.hits.position_of(*ray as usize);
-            let lift = Vec3::splat(Points::lift(work, *ray as usize));
+            let lift = Vec3::splat(lift(work, *ray as usize));
             (low, high) = (low.min(position - lift), high.max(position + lift));
         }
         self.near.find(simd, &aims.shelves, (low, high), aims.reach);
@@ -551,21 +559,13 @@ impl Points {
     fn push(&mut self, work: Work<'_>, ray: u32) {
         let at = ray as usize;
         let (position, normal) = (work.hits.position_of(at), work.hits.normal_of(at));
-        let origin = position + normal * Self::lift(work, at);
+        let origin = position + normal * lift(work, at);
         for axis in 0..3 {
             self.origin[axis].push(origin[axis]);
             self.normal[axis].push(normal[axis]);
         }
         self.ray.push(ray);
         self.count += 1;
-    }
-
-    /// How far from its surface the rays of a hit start: a thousandth of the radius, and what rounding of
-    /// the coordinates may add to it.
-    #[inline(always)]
-    fn lift(work: Work<'_>, ray: usize) -> f32 {
-        let size = work.hits.position_of(ray).abs().max_element() + work.rays.distance[ray];
-        1e-3 * work.hits.radius[ray] + 1e-6 * size
     }
 
     fn get(&self, point: usize) -> (Vec3, Vec3) {
@@ -650,9 +650,17 @@ impl Points {
     }
 }
 
+/// How far from its surface the rays of a hit start: a thousandth of the radius, and what rounding of
+/// the coordinates may add to it.
+#[inline(always)]
+pub(crate) fn lift(work: Work<'_>, ray: usize) -> f32 {
+    let size = work.hits.position_of(ray).abs().max_element() + work.rays.distance[ray];
+    1e-3 * work.hits.radius[ray] + 1e-6 * size
+}
+
 /// Turns sums into visible parts, which the hits of a square of two by two pixels (of a pixel, if it
 /// fills a block) on the same sphere share. `times` what is there already, or instead of it.
-fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
+pub(crate) fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bool) {
     let (hits, rays) = (work.hits, work.rays);
     let squares: &[u16] = match rays.pattern.side {
         4 => &[0x0033, 0x00cc, 0x3300, 0xcc00],

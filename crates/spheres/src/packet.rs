@@ -34,6 +34,26 @@ pub struct Packet {
     hit_slot: [u32; MOST_RAYS],
     /// The system of the nearest sphere.
     hit_system: [u16; MOST_RAYS],
+    /// Whether rays look for what comes after a surface they have met.
+    pub(crate) peels: bool,
+    /// That surface: its distance, and its system and index.
+    pub(crate) after: [f32; MOST_RAYS],
+    pub(crate) after_sphere: [(u16, u32); MOST_RAYS],
+    /// The system at hand.
+    pub(crate) system: u16,
+    /// Optical depth of what each ray has met, for rays that go through.
+    pub(crate) optical: [u32; MOST_RAYS],
+}
+
+/// A surface that a ray has met. Along a ray, surfaces come by distance, then system, then index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Distance along the ray.
+    pub distance: f32,
+    /// System of the sphere.
+    pub system: u16,
+    /// Its index in the file's own order.
+    pub index: u32,
 }
 
 impl Packet {
@@ -49,19 +69,30 @@ impl Packet {
             slot: [NO_SLOT; MOST_RAYS],
             hit_slot: [NO_SLOT; MOST_RAYS],
             hit_system: [0; MOST_RAYS],
+            peels: false,
+            after: [0.0; MOST_RAYS],
+            after_sphere: [(0, 0); MOST_RAYS],
+            system: 0,
+            optical: [0; MOST_RAYS],
         }
     }
 
     /// Removes all rays and hits; the rays to come look for what is nearest.
     pub fn clear(&mut self) {
         self.rays = 0;
-        self.any_hit = false;
+        (self.any_hit, self.peels) = (false, false);
     }
 
     /// Removes all rays and hits; the rays to come only ask whether there is anything.
     pub fn clear_for_any_hit(&mut self) {
         self.rays = 0;
-        self.any_hit = true;
+        (self.any_hit, self.peels) = (true, false);
+    }
+
+    /// Removes all rays and hits; the rays to come look for the nearest surface after one they have met.
+    pub fn clear_for_next(&mut self) {
+        self.rays = 0;
+        (self.any_hit, self.peels) = (false, true);
     }
 
     /// From now on tests every sphere of the cells its frustum overlaps, culling none: what Gribble et
@@ -90,7 +121,18 @@ impl Packet {
         }
         self.distance[i] = reach;
         self.hit_slot[i] = NO_SLOT;
+        self.optical[i] = 0;
         self.rays += 1;
+    }
+
+    /// Adds a ray that looks for what comes after `met`, to a packet cleared for that.
+    ///
+    /// # Panics
+    /// If the packet is full.
+    pub fn push_after(&mut self, origin: Vec3, direction: Vec3, met: Surface) {
+        self.after[self.rays] = met.distance;
+        self.after_sphere[self.rays] = (met.system, met.index);
+        self.push(origin, direction);
     }
 
     /// How many rays there are.
@@ -117,6 +159,8 @@ impl Packet {
             }
             self.distance[i] = self.distance[0];
             self.slot[i] = self.slot[0];
+            self.after[i] = self.after[0];
+            self.after_sphere[i] = self.after_sphere[0];
         }
     }
 
@@ -160,9 +204,13 @@ impl Packet {
     pub(crate) fn single(&self, i: usize) -> Self {
         let mut one = Self::new();
         (one.any_hit, one.culls) = (self.any_hit, self.culls);
+        (one.peels, one.system) = (self.peels, self.system);
         one.push(self.origin_of(i), self.direction_of(i));
         one.distance[0] = self.distance[i];
         one.slot[0] = self.slot[i];
+        one.after[0] = self.after[i];
+        one.after_sphere[0] = self.after_sphere[i];
+        one.optical[0] = self.optical[i];
         one
     }
 }

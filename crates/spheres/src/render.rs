@@ -11,7 +11,8 @@ use crate::aims::Aims;
 use crate::hits::Hits;
 use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
-use crate::packet::{MOST_RAYS, Packet};
+use crate::packet::{MOST_RAYS, NO_SLOT, Packet};
+use crate::peel::Peel;
 use crate::project::project;
 use crate::shade::{Canvas, Paint, shade};
 use crate::tile::{Pattern, Place, RayTile};
@@ -164,6 +165,7 @@ struct Desk {
     packet: Box<Packet>,
     hits: Hits,
     occluder: Occluder,
+    peel: Peel,
     color: Vec<[f32; 4]>,
     /// Whether there is no light in `color`.
     blank: bool,
@@ -177,6 +179,7 @@ impl Desk {
             packet: Box::new(Packet::new()),
             hits: Hits::new(),
             occluder: Occluder::new(),
+            peel: Peel::new(),
             color: Vec::new(),
             blank: true,
             center: Vec::new(),
@@ -283,7 +286,12 @@ impl<'a> Plan<'a> {
         for pattern in &self.rounds {
             for part in parts(place, pattern.tile_side()) {
                 self.first_hits(simd, (area, part, *pattern), desk, counts);
-                if desk.hits.gather(simd, &desk.rays, self.view.systems) > 0 {
+                if desk.hits.gather(simd, &desk.rays, self.view.systems) == 0 {
+                    continue;
+                }
+                if self.view.paint.translucent() {
+                    self.peel(simd, (place, part, first_sample), desk, counts);
+                } else {
                     self.light(simd, (place, part, first_sample), desk, counts);
                 }
             }
@@ -317,7 +325,8 @@ impl<'a> Plan<'a> {
         rays.aim(simd, view.rays, (part, pattern), None);
         match settings.primary {
             Primary::Trace => {
-                trace_tile(simd, (rays, &mut desk.packet), (view.systems, settings.packet), counts);
+                let how = (view.systems, settings.packet, None);
+                trace_tile(simd, (rays, &mut desk.packet), how, counts);
             }
             Primary::Project => {
                 for (system, spheres) in view.systems.iter().enumerate() {
@@ -332,6 +341,31 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// Adds the light of the hits of a part and of what lies behind them, front to back.
+    #[simd]
+    fn peel<S: Simd>(
+        &self,
+        simd: S,
+        at: (Place, Place, u32),
+        desk: &mut Desk,
+        counts: &mut Counts,
+    ) {
+        desk.peel.begin();
+        loop {
+            desk.peel.weigh(&desk.rays, &desk.hits, self.view.paint);
+            self.light(simd, at, desk, counts);
+            let Desk { rays, hits, peel, packet, .. } = &mut *desk;
+            if !peel.goes_on(rays, hits) {
+                return;
+            }
+            let how = (self.view.systems, self.settings.packet, Some(&*hits));
+            trace_tile(simd, (rays, packet), how, counts);
+            if hits.gather(simd, rays, self.view.systems) == 0 {
+                return;
+            }
+        }
+    }
+
     /// Adds the light of the hits of a part to the colours of its area.
     #[simd]
     fn light<S: Simd>(
@@ -342,7 +376,8 @@ impl<'a> Plan<'a> {
         counts: &mut Counts,
     ) {
         desk.blank = false;
-        let Desk { rays, hits, occluder, color, .. } = desk;
+        let Desk { rays, hits, occluder, peel, color, .. } = desk;
+        let translucent = self.view.paint.translucent();
         let weight = 1.0 / self.settings.samples as f32;
         let work = Work {
             rays,
@@ -352,12 +387,17 @@ impl<'a> Plan<'a> {
             corner: part.corner,
             first_sample,
         };
-        occluder.reach(simd, work, counts);
+        if translucent {
+            occluder.reach_through(simd, work, counts);
+        } else {
+            occluder.reach(simd, work, counts);
+        }
         let canvas = Canvas {
             color,
             width: place.size.0,
             at: (part.corner.0 - place.corner.0, part.corner.1 - place.corner.1),
             weight,
+            parts: translucent.then_some(&peel.part),
         };
         shade(simd, (rays, hits, &occluder.reaching), self.view, canvas);
     }
@@ -374,12 +414,13 @@ fn parts(place: Place, side: u32) -> impl Iterator<Item = Place> {
     })
 }
 
-/// Traces the rays of a tile in packets of `side`² (Gribble et al. 2007, §4).
+/// Traces the rays of a tile in packets of `side`² (Gribble et al. 2007, §4); where they have `met`
+/// something, to what comes after that.
 #[simd]
 fn trace_tile<S: Simd>(
     simd: S,
     (rays, packet): (&mut RayTile, &mut Packet),
-    (systems, side): (&[Spheres<'_>], u32),
+    (systems, side, met): (&[Spheres<'_>], u32, Option<&Hits>),
     counts: &mut Counts,
 ) {
     let samples = rays.pattern.samples;
@@ -389,13 +430,23 @@ fn trace_tile<S: Simd>(
     let mut own = [0usize; MOST_RAYS];
     for y in (0..rays.pattern.tile_side()).step_by(side as usize) {
         for x in (0..rays.pattern.tile_side()).step_by(side as usize) {
-            packet.clear();
+            if met.is_some() {
+                packet.clear_for_next();
+            } else {
+                packet.clear();
+            }
             for i in 0..side * side {
                 for sample in 0..samples {
                     let ray = rays.pattern.ray((x + i % side, y + i / side), sample);
                     if rays.distance[ray] > 0.0 {
                         own[packet.len()] = ray;
-                        packet.push(rays.origin_of(ray), rays.direction_of(ray));
+                        let (origin, direction) = (rays.origin_of(ray), rays.direction_of(ray));
+                        match met {
+                            None => packet.push(origin, direction),
+                            Some(hits) => {
+                                packet.push_after(origin, direction, hits.surface(rays, ray))
+                            }
+                        }
                     }
                 }
             }
@@ -404,11 +455,11 @@ fn trace_tile<S: Simd>(
             }
             trace(simd, packet, systems, counts);
             for (i, ray) in own[..packet.len()].iter().enumerate() {
-                if let Some((distance, system, slot)) = packet.hit(i) {
-                    rays.distance[*ray] = distance;
-                    rays.hit_system[*ray] = system;
-                    rays.hit_slot[*ray] = slot;
-                }
+                let nothing = (f32::INFINITY, 0, NO_SLOT);
+                let (distance, system, slot) = packet.hit(i).unwrap_or(nothing);
+                rays.distance[*ray] = distance;
+                rays.hit_system[*ray] = system;
+                rays.hit_slot[*ray] = slot;
             }
         }
     }

@@ -22,6 +22,16 @@ pub trait Paint: Sync {
     fn uniform(&self, _system: u16) -> Option<Vec3> {
         None
     }
+
+    /// How much of what lies behind it a particle hides: 0 nothing, 1 all.
+    fn opacity(&self, _system: u16, _index: u32) -> f32 {
+        1.0
+    }
+
+    /// Whether any particle's opacity is below 1; else `opacity` is not asked.
+    fn translucent(&self) -> bool {
+        false
+    }
 }
 
 /// Where the light of a tile's hits goes.
@@ -34,6 +44,8 @@ pub(crate) struct Canvas<'a> {
     pub at: (u32, u32),
     /// What each sample counts.
     pub weight: f32,
+    /// Of each ray, the part of its sample that this surface makes; none: the whole.
+    pub parts: Option<&'a [f32]>,
 }
 
 /// Adds the light of a tile's hits to the canvas.
@@ -73,7 +85,11 @@ pub(crate) fn shade<S: Simd>(
         let ny = f32x16::from_slice(simd, &hits.normal[1][lanes.clone()]);
         let nz = f32x16::from_slice(simd, &hits.normal[2][lanes.clone()]);
         let key = f32x16::from_slice(simd, &reaching.key[lanes.clone()]);
-        let fill = f32x16::from_slice(simd, &reaching.fill[lanes]);
+        let fill = f32x16::from_slice(simd, &reaching.fill[lanes.clone()]);
+        let weight = match canvas.parts {
+            None => f32x16::splat(simd, canvas.weight),
+            Some(parts) => f32x16::from_slice(simd, &parts[lanes]) * canvas.weight,
+        };
         let up = nz * lights.up.z + ny * lights.up.y + nx * lights.up.x;
         let above = half * up + half;
         let hit = mask32x16::from_bitmask(simd, u64::from(hits.mask[block]));
@@ -83,9 +99,9 @@ pub(crate) fn shade<S: Simd>(
             let of_fill = above * sky[channel] + lights.ground[channel];
             let sum = key * lights.key.color[channel] + of_fill * fill + lights.ambient[channel];
             let albedo = f32x16::from_slice(simd, &albedo[channel]);
-            light[channel] = hit.select(sum * albedo * canvas.weight, zero);
+            light[channel] = hit.select(sum * albedo * weight, zero);
         }
-        light[3] = hit.select(f32x16::splat(simd, canvas.weight), zero);
+        light[3] = hit.select(weight, zero);
         canvas.add(&rays.pattern, block, light);
     }
 }

@@ -10,8 +10,9 @@ use fearless_simd_macros::simd;
 use motes_grid::{Block, Grid, RadiusClasses, Seen, Visibility};
 
 use crate::frustum::{Bounds, Frustum};
-use crate::intersect::{Cull, Sphere, bits, cull, farthest, intersect};
+use crate::intersect::{Cull, Sphere, bits, cull, dim, farthest, intersect, optical_depth};
 use crate::packet::{LANES, Packet};
+use crate::shade::Paint;
 
 /// One particle system as the tracer sees it: its grids, and what is visible of each.
 #[derive(Clone, Copy, Debug)]
@@ -71,12 +72,35 @@ impl Counts {
 pub fn trace<S: Simd>(simd: S, packet: &mut Packet, systems: &[Spheres<'_>], counts: &mut Counts) {
     for (system, spheres) in systems.iter().enumerate() {
         packet.begin_system();
+        packet.system = system as u16;
         let mut first_slot = 0;
         for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
-            trace_grid(simd, packet, Room { spheres, grid, visible, first_slot }, counts);
+            let room = Room { spheres, grid, visible, first_slot, dims: None };
+            trace_grid(simd, packet, room, counts);
             first_slot += grid.len() as u32;
         }
         packet.end_system(system as u16);
+    }
+}
+
+/// Traces the packet through the systems, past whatever is translucent; afterwards each ray holds the
+/// optical depth of all it meets within its reach, each sphere counted once.
+#[simd]
+pub(crate) fn trace_through<S: Simd>(
+    simd: S,
+    packet: &mut Packet,
+    systems: &[Spheres<'_>],
+    paint: &dyn Paint,
+    counts: &mut Counts,
+) {
+    for (system, spheres) in systems.iter().enumerate() {
+        packet.begin_system();
+        let dims = Some((paint, system as u16));
+        let mut first_slot = 0;
+        for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
+            trace_grid(simd, packet, Room { spheres, grid, visible, first_slot, dims }, counts);
+            first_slot += grid.len() as u32;
+        }
     }
 }
 
@@ -87,6 +111,8 @@ struct Room<'a> {
     grid: &'a Grid,
     visible: &'a Visibility,
     first_slot: u32,
+    /// For rays that go through what is translucent: opacities, and the system.
+    dims: Option<(&'a dyn Paint, u16)>,
 }
 
 /// Cells along K of one step inside a block where K is x: rows along x are runs of particles.
@@ -104,6 +130,7 @@ fn trace_grid<S: Simd>(simd: S, packet: &mut Packet, room: Room<'_>, counts: &mu
                 trace_grid(simd, &mut one, room, counts);
                 packet.distance[i] = one.distance[0];
                 packet.slot[i] = one.slot[0];
+                packet.optical[i] = one.optical[0];
             }
             packet.pad();
         }
@@ -284,7 +311,13 @@ impl<S: Simd> Walk<'_, S> {
             slot: self.room.first_slot + place as u32,
         };
         self.counts.tests += self.packet.rays as u64;
-        intersect(simd, self.packet, sphere, &|slot| self.room.spheres.index(slot))
+        let spheres = self.room.spheres;
+        match self.room.dims {
+            None => intersect(simd, self.packet, sphere, &|slot| spheres.index(slot)),
+            Some((paint, system)) => dim(simd, self.packet, sphere, &|slot| {
+                optical_depth(paint.opacity(system, spheres.index(slot)))
+            }),
+        }
     }
 }
 
