@@ -192,7 +192,7 @@ impl Bench {
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;
-        let paint = crate::paint::Paint::new(particles, &system.color, None)?;
+        let paint = crate::paint::Paint::new(particles, system, None)?;
         let particles = Arc::clone(particles);
         Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
     }
