@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::cells::most_cells;
 use crate::groups::groups_of;
 use crate::places::Places;
-use crate::scatter::{Buckets, Counts, Source, Survey, scatter};
+use crate::scatter::{Buckets, Source, Survey, scatter};
 use crate::sort::{Bucket, Rules, Scratch};
 use crate::{Block, Grid, Lattice, Pages, Radii};
 
@@ -43,11 +43,6 @@ impl Default for Params {
         Self { resolution: Resolution::CellsPerParticle(1.0), block_cells: 6 }
     }
 }
-
-/// Particles per bucket of the first sort, so that the second runs in cache.
-const BUCKET_PARTICLES: usize = 16 * 1024;
-/// Most buckets of the first sort: more places at once do not stay in the nearest cache.
-const MOST_BUCKETS: usize = 1024;
 
 impl Grid {
     /// Builds a grid over those of `positions` that `chosen` lists (all, if `None`).
@@ -89,8 +84,7 @@ impl Grid {
             return Self::empty();
         }
         let lattice = lattice_for(&survey, params);
-        let buckets = buckets_for(&lattice, survey.count);
-        let counts = Counts::of(&source, &survey, &buckets, level);
+        let buckets = Buckets::new(&source, &survey, &lattice, level);
 
         let spare = self;
         let mut grid = Self {
@@ -108,12 +102,11 @@ impl Grid {
             ..Self::empty()
         };
         let radius = grid.radius.each_mut();
-        scatter(&source, (&survey, &buckets, &counts), &mut grid.particles, radius, level);
-        let starts = counts.starts();
-        drop((counts, positions));
+        scatter(&source, (&survey, &buckets), &mut grid.particles, radius, level);
+        drop(positions);
         let places = Places::of_blocks(&lattice);
         let rules = Rules { lattice: &lattice, places, params, radii, level };
-        grid.sort_buckets(&starts, buckets.shift, &rules);
+        grid.sort_buckets((&buckets.starts(), &buckets.blocks), &rules);
         grid.sum_up();
         grid
     }
@@ -135,29 +128,28 @@ impl Grid {
         }
     }
 
-    /// The second sort: each bucket by itself.
-    fn sort_buckets(&mut self, starts: &[usize], shift: u32, rules: &Rules<'_>) {
+    /// The second sort: each bucket by itself. Takes where each begins among particles and blocks.
+    fn sort_buckets(&mut self, (starts, firsts): (&[usize], &[usize]), rules: &Rules<'_>) {
         self.blocks.resize(rules.lattice.count() + 1, Block::default());
         let counts = || starts.windows(2).map(|pair| pair[1] - pair[0]);
         let each = matches!(self.radius, Radii::Each(_));
         let radii_counts = counts().map(|n| if each { n } else { 0 });
         let end_block = self.blocks.len() - 1;
-        let block_counts = self.blocks[..end_block].chunks(1 << shift).map(<[Block]>::len);
+        let block_counts = || firsts.windows(2).map(|pair| pair[1] - pair[0]);
         let cell_counts: Vec<usize> =
-            counts().zip(block_counts).map(|(n, b)| most_cells(n, b, rules.params)).collect();
+            counts().zip(block_counts()).map(|(n, b)| most_cells(n, b, rules.params)).collect();
         let cells: usize = cell_counts.iter().sum();
         self.cell_starts = std::mem::take(&mut self.cell_starts).reused(cells + 1);
 
         let mut first_cell = 0;
-        let buckets: Vec<Bucket<'_>> = self.blocks[..end_block]
-            .chunks_mut(1 << shift)
+        let buckets: Vec<Bucket<'_>> = split(&mut self.blocks, block_counts())
             .zip(split(&mut self.particles, counts()))
             .zip(split(self.radius.each_mut(), radii_counts))
             .zip(split(&mut self.cell_starts, cell_counts.into_iter()))
             .enumerate()
             .map(|(b, (((blocks, particles), radii), starts_of_cells))| {
                 let bucket = Bucket {
-                    first_block: b << shift,
+                    first_block: firsts[b],
                     blocks,
                     first: starts[b],
                     particles,
@@ -223,14 +215,6 @@ fn lattice_for(survey: &Survey, params: Params) -> Lattice {
             Lattice::with_edge(low, high, (f64::from(edge) * m).max(least))
         }
     }
-}
-
-fn buckets_for(lattice: &Lattice, particles: usize) -> Buckets {
-    let blocks = lattice.count();
-    let wanted = (particles / BUCKET_PARTICLES).clamp(1, MOST_BUCKETS);
-    let shift = blocks.div_ceil(wanted).next_power_of_two().trailing_zeros();
-    let count = blocks.div_ceil(1 << shift);
-    Buckets { places: Places::of_blocks(lattice), shift, count }
 }
 
 /// Cuts a slice into parts of these lengths; what lies after the last is left out.

@@ -22,6 +22,7 @@ mod places;
 mod ranges;
 mod scatter;
 mod sort;
+mod streams;
 mod visibility;
 
 pub use build::{Params, Resolution};

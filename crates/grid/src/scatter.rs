@@ -4,13 +4,14 @@
 //! thread inserts the particles of its own buckets. The input is cut into chunks; each chunk counts
 //! what it has for each bucket, and so knows its own piece of every bucket. The sort is stable.
 
-use fearless_simd::{Level, dispatch, prelude::*};
+use fearless_simd::{Level, dispatch, f32x4, mask32x4, prelude::*, u32x4};
 use fearless_simd_macros::simd;
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::places::{BATCH, Places, bounds_of_points, of_points};
-use crate::{Particle, Radii};
+use crate::streams::{Piece, Streams};
+use crate::{Lattice, Particle, Radii};
 
 /// Pieces the input is cut into. Fixed, though the result does not depend on it.
 const CHUNKS: usize = 16;
@@ -94,131 +95,138 @@ impl Source<'_> {
     }
 }
 
-/// Where the buckets are: 2^shift blocks each.
-#[derive(Clone, Copy)]
+/// Runs of blocks with about equally many particles.
+///
+/// Blocks are first counted in bins, 2^shift blocks each; a bucket is a run of bins.
 pub(crate) struct Buckets {
-    pub places: Places,
-    pub shift: u32,
-    pub count: usize,
+    places: Places,
+    shift: u32,
+    /// The bucket of each bin.
+    bucket_of: Vec<u16>,
+    /// How many particles each chunk has for each bucket: `[chunk][bucket]`.
+    counts: Vec<Vec<u32>>,
+    /// Where each bucket begins among the blocks, and the end of the last.
+    pub blocks: Vec<usize>,
 }
 
-/// How many particles each chunk has for each bucket: `[chunk][bucket]`.
-pub(crate) struct Counts(Vec<Vec<u32>>);
+/// Most bins: their counts stay in the nearest cache.
+const MOST_BINS: usize = 1 << 13;
+/// Particles per bucket, so that the second sort runs in cache.
+const BUCKET_PARTICLES: usize = 16 * 1024;
+/// Most buckets: the lines of more do not stay in cache.
+const MOST_BUCKETS: usize = 512;
 
-impl Counts {
-    pub fn of(source: &Source<'_>, survey: &Survey, buckets: &Buckets, level: Level) -> Self {
+impl Buckets {
+    /// Counts the particles of `source` and chooses the buckets.
+    pub fn new(source: &Source<'_>, survey: &Survey, lattice: &Lattice, level: Level) -> Self {
+        let places = Places::of_blocks(lattice);
+        let blocks = lattice.count();
+        let shift = blocks.div_ceil(MOST_BINS).next_power_of_two().trailing_zeros();
+        let bins = Bins { places, shift, count: blocks.div_ceil(1 << shift) };
         let count = |chunk: &Chunk| match source.whole(chunk) {
-            Some(points) => dispatch!(level, simd => count_points(simd, buckets, points)),
+            Some(points) => dispatch!(level, simd => count_points(simd, &bins, points)),
             None => {
-                let mut counts = vec![0; buckets.count];
-                for item in source.items(chunk.range.clone()) {
-                    counts[(buckets.places.of(item.center) >> buckets.shift) as usize] += 1;
-                }
+                let mut counts = vec![0; bins.count];
+                source.items(chunk.range.clone()).for_each(|p| counts[bins.of(p.center)] += 1);
                 counts
             }
         };
-        Self(survey.chunks.par_iter().with_max_len(1).map(count).collect())
+        let bin_counts: Vec<Vec<u32>> =
+            survey.chunks.par_iter().with_max_len(1).map(count).collect();
+
+        let most = BUCKET_PARTICLES.max(survey.count.div_ceil(MOST_BUCKETS - 1));
+        let mut buckets = Self {
+            places,
+            shift,
+            bucket_of: Vec::with_capacity(bins.count),
+            counts: vec![vec![0]; bin_counts.len()],
+            blocks: vec![0],
+        };
+        let mut held = 0;
+        for bin in 0..bins.count {
+            let count: usize = bin_counts.iter().map(|counts| counts[bin] as usize).sum();
+            // No more buckets than asked for: two of them in a row hold more than `most`.
+            if held > 0 && held + count > most {
+                buckets.blocks.push(bin << shift);
+                buckets.counts.iter_mut().for_each(|counts| counts.push(0));
+                held = 0;
+            }
+            held += count;
+            let bucket = buckets.blocks.len() - 1;
+            buckets.bucket_of.push(bucket as u16);
+            for (counts, bins) in buckets.counts.iter_mut().zip(&bin_counts) {
+                counts[bucket] += bins[bin];
+            }
+        }
+        buckets.blocks.push(blocks);
+        buckets
     }
 
-    /// Where each bucket begins, and the end of the last.
+    /// The bucket of a block.
+    #[inline(always)]
+    fn of(&self, block: u32) -> usize {
+        usize::from(self.bucket_of[(block >> self.shift) as usize])
+    }
+
+    /// Where each bucket begins among the particles, and the end of the last.
     pub fn starts(&self) -> Vec<usize> {
-        let buckets = self.0.first().map_or(0, Vec::len);
+        let buckets = self.blocks.len() - 1;
         let mut starts = Vec::with_capacity(buckets + 1);
         let mut sum = 0;
         starts.push(0);
         for bucket in 0..buckets {
-            sum += self.0.iter().map(|counts| counts[bucket] as usize).sum::<usize>();
+            sum += self.counts.iter().map(|counts| counts[bucket] as usize).sum::<usize>();
             starts.push(sum);
         }
         starts
     }
 
     /// Cuts `array` into one piece for each chunk and bucket: bucket by bucket, in it chunk by chunk.
-    fn streams<'a, T: Copy + Default>(&self, array: &'a mut [T]) -> Vec<Vec<Stream<'a, T>>> {
-        let buckets = self.0.first().map_or(0, Vec::len);
-        let mut streams: Vec<Vec<_>> = self.0.iter().map(|_| Vec::with_capacity(buckets)).collect();
-        let mut rest = array;
-        let mut at = 0;
+    fn pieces<'a, T>(&self, array: &'a mut [T]) -> Vec<Vec<Piece<'a, T>>> {
+        let buckets = self.blocks.len() - 1;
+        let mut pieces: Vec<Vec<_>> =
+            self.counts.iter().map(|_| Vec::with_capacity(buckets)).collect();
+        let (mut at, mut rest) = (0, array);
         for bucket in 0..buckets {
-            for (counts, streams) in self.0.iter().zip(&mut streams) {
+            for (counts, pieces) in self.counts.iter().zip(&mut pieces) {
                 let (piece, after) = rest.split_at_mut(counts[bucket] as usize);
-                streams.push(Stream::new(piece, at));
+                pieces.push((at, piece));
                 at += counts[bucket] as usize;
                 rest = after;
             }
         }
-        streams
+        pieces
     }
 }
 
-/// How many elements are written at once.
-const LINE: usize = 8;
-
-/// Elements on their way to a piece of an array, a few at a time: so many pieces are open at once that
-/// writing each element by itself would wait for memory every time.
-struct Stream<'a, T> {
-    line: [T; LINE],
-    /// Which elements of the line wait.
-    from: u32,
-    to: u32,
-    rest: &'a mut [T],
+/// Runs of 2^shift blocks.
+struct Bins {
+    places: Places,
+    shift: u32,
+    count: usize,
 }
 
-impl<'a, T: Copy + Default> Stream<'a, T> {
-    /// A stream to `piece`, which begins at `at` of the array. Lines begin at multiples of their length.
-    fn new(piece: &'a mut [T], at: usize) -> Self {
-        let from = (at % LINE) as u32;
-        Self { line: [T::default(); LINE], from, to: from, rest: piece }
-    }
-
-    #[inline(always)]
-    fn put(&mut self, value: T) {
-        // Not when its last element comes: reading the line would then wait for that to arrive.
-        if self.to as usize == LINE {
-            self.flush();
-        }
-        self.line[self.to as usize % LINE] = value;
-        self.to += 1;
-    }
-
-    #[inline(always)]
-    fn flush(&mut self) {
-        if self.to - self.from != LINE as u32 {
-            return self.flush_part();
-        }
-        if let Some((place, rest)) = std::mem::take(&mut self.rest).split_first_chunk_mut() {
-            *place = self.line;
-            self.rest = rest;
-        }
-        self.to = 0;
-    }
-
-    /// Writes a line that is not full: the first or the last of the piece.
-    #[cold]
-    fn flush_part(&mut self) {
-        let waiting = &self.line[self.from as usize..self.to as usize];
-        let (place, rest) = std::mem::take(&mut self.rest).split_at_mut(waiting.len());
-        place.copy_from_slice(waiting);
-        self.rest = rest;
-        (self.from, self.to) = (0, 0);
+impl Bins {
+    fn of(&self, p: [f32; 3]) -> usize {
+        (self.places.of(p) >> self.shift) as usize
     }
 }
 
 #[simd]
-fn count_points<S: Simd>(simd: S, buckets: &Buckets, points: &[[f32; 3]]) -> Vec<u32> {
+fn count_points<S: Simd>(simd: S, bins: &Bins, points: &[[f32; 3]]) -> Vec<u32> {
     // Four counts for each bucket: neighbours in the file often share one, and would wait for it.
-    let mut counts = vec![[0u32; 4]; buckets.count];
-    let rows = buckets.places.in_rows();
+    let mut counts = vec![[0u32; 4]; bins.count];
+    let rows = bins.places.in_rows();
     let batches = points.chunks_exact(BATCH);
     let rest = batches.remainder();
     for batch in batches {
         let places = of_points(simd, &rows, batch);
         for i in 0..BATCH {
-            counts[(places[i] >> buckets.shift) as usize][i % 4] += 1;
+            counts[(places[i] >> bins.shift) as usize][i % 4] += 1;
         }
     }
     for point in rest {
-        counts[(buckets.places.of(*point) >> buckets.shift) as usize][0] += 1;
+        counts[bins.of(*point)][0] += 1;
     }
     counts.iter().map(|c| c[0] + c[1] + c[2] + c[3]).collect()
 }
@@ -227,48 +235,76 @@ fn count_points<S: Simd>(simd: S, buckets: &Buckets, points: &[[f32; 3]]) -> Vec
 /// where they differ.
 pub(crate) fn scatter(
     source: &Source<'_>,
-    (survey, buckets, counts): (&Survey, &Buckets, &Counts),
+    (survey, buckets): (&Survey, &Buckets),
     particles: &mut [Particle],
     radii: &mut [f32],
     level: Level,
 ) {
-    let places = counts.streams(particles);
+    let pieces = buckets.pieces(particles);
     match source.radii {
         Radii::Uniform(_) => {
-            survey.chunks.par_iter().zip(places).with_max_len(1).for_each(|(chunk, places)| {
-                scatter_chunk(source, (chunk, buckets), places, level);
+            survey.chunks.par_iter().zip(pieces).with_max_len(1).for_each(|(chunk, pieces)| {
+                let mut to = Streams::new(pieces);
+                scatter_chunk(source, (chunk, buckets), &mut to, level);
+                to.finish();
             });
         }
-        Radii::Each(each) => {
-            let radii = counts.streams(radii);
-            let work = survey.chunks.par_iter().zip(places.into_par_iter().zip(radii));
-            work.with_max_len(1).for_each(|(chunk, (places, radii))| {
-                let places: Vec<_> =
-                    places.into_iter().zip(radii).map(|(p, r)| WithRadius(p, r, each)).collect();
-                scatter_chunk(source, (chunk, buckets), places, level);
+        Radii::Each(radii_of) => {
+            let work = pieces.into_par_iter().zip(buckets.pieces(radii));
+            survey.chunks.par_iter().zip(work).with_max_len(1).for_each(|(chunk, work)| {
+                let (particles, radii) = (Streams::new(work.0), Streams::new(work.1));
+                let mut to = WithRadii { particles, radii, radii_of };
+                scatter_chunk(source, (chunk, buckets), &mut to, level);
+                to.particles.finish();
+                to.radii.finish();
             });
         }
+    }
+}
+
+/// Where particles go, by bucket.
+trait Put {
+    fn put(&mut self, bucket: usize, particle: Particle);
+}
+
+impl Put for Streams<'_, Particle> {
+    #[inline(always)]
+    fn put(&mut self, bucket: usize, particle: Particle) {
+        self.put(bucket, particle);
+    }
+}
+
+/// Streams of particles and of their radii.
+struct WithRadii<'a> {
+    particles: Streams<'a, Particle>,
+    radii: Streams<'a, f32>,
+    /// In the file's order.
+    radii_of: &'a [f32],
+}
+
+impl Put for WithRadii<'_> {
+    #[inline(always)]
+    fn put(&mut self, bucket: usize, particle: Particle) {
+        self.particles.put(bucket, particle);
+        self.radii.put(bucket, self.radii_of[particle.index as usize]);
     }
 }
 
 fn scatter_chunk(
     source: &Source<'_>,
     (chunk, buckets): (&Chunk, &Buckets),
-    mut places: Vec<impl Put>,
+    to: &mut impl Put,
     level: Level,
 ) {
     match source.whole(chunk) {
         Some(points) => {
             let first = chunk.range.start as u32;
-            dispatch!(level, simd => scatter_points(simd, buckets, (points, first), &mut places));
+            dispatch!(level, simd => scatter_points(simd, buckets, (points, first), to));
         }
-        None => {
-            for item in source.items(chunk.range.clone()) {
-                places[(buckets.places.of(item.center) >> buckets.shift) as usize].put(item);
-            }
-        }
+        None => source.items(chunk.range.clone()).for_each(|particle| {
+            to.put(buckets.of(buckets.places.of(particle.center)), particle);
+        }),
     }
-    places.iter_mut().for_each(Put::end);
 }
 
 #[simd]
@@ -276,58 +312,25 @@ fn scatter_points<S: Simd, P: Put>(
     simd: S,
     buckets: &Buckets,
     (points, first): (&[[f32; 3]], u32),
-    places: &mut [P],
+    to: &mut P,
 ) {
     let rows = buckets.places.in_rows();
-    let batches = points.chunks_exact(BATCH);
-    let rest = batches.remainder();
-    let mut index = first;
-    for batch in batches {
-        let numbers = of_points(simd, &rows, batch);
+    let numbers: &[f32] = bytemuck::cast_slice(points);
+    let index_lane = mask32x4::from_bitmask(simd, 0b1000);
+    // Particles are read four numbers at a time, so that the last one is not read by sixteens.
+    let whole = points.len().saturating_sub(1) / BATCH * BATCH;
+    for at in (0..whole).step_by(BATCH) {
+        let places = of_points(simd, &rows, &points[at..at + BATCH]);
+        let batch = &numbers[3 * at..3 * (at + BATCH) + 1];
         for i in 0..BATCH {
-            let particle = Particle { center: batch[i], index };
-            places[(numbers[i] >> buckets.shift) as usize].put(particle);
-            index += 1;
+            let center = f32x4::from_slice(simd, &batch[3 * i..3 * i + 4]);
+            let index = u32x4::splat(simd, first + (at + i) as u32).bitcast::<f32x4<S>>();
+            let particle: [f32; 4] = index_lane.select(index, center).into();
+            to.put(buckets.of(places[i]), bytemuck::cast(particle));
         }
     }
-    for point in rest {
-        let place = &mut places[(buckets.places.of(*point) >> buckets.shift) as usize];
-        place.put(Particle { center: *point, index });
-        index += 1;
-    }
-}
-
-/// Where the next particle of a bucket goes.
-trait Put: Send {
-    fn put(&mut self, particle: Particle);
-
-    /// Writes what waits.
-    fn end(&mut self);
-}
-
-impl Put for Stream<'_, Particle> {
-    #[inline(always)]
-    fn put(&mut self, particle: Particle) {
-        self.put(particle);
-    }
-
-    fn end(&mut self) {
-        self.flush();
-    }
-}
-
-/// A stream of particles, the same of their radii, and all radii in the file's order.
-struct WithRadius<'a>(Stream<'a, Particle>, Stream<'a, f32>, &'a [f32]);
-
-impl Put for WithRadius<'_> {
-    #[inline(always)]
-    fn put(&mut self, particle: Particle) {
-        self.0.put(particle);
-        self.1.put(self.2[particle.index as usize]);
-    }
-
-    fn end(&mut self) {
-        self.0.flush();
-        self.1.flush();
+    for (i, point) in points.iter().enumerate().skip(whole) {
+        let particle = Particle { center: *point, index: first + i as u32 };
+        to.put(buckets.of(buckets.places.of(*point)), particle);
     }
 }

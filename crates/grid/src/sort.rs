@@ -66,16 +66,17 @@ impl Bucket<'_> {
         let (first_block, particles) = (self.first_block as u32, &*self.particles);
         let numbers = first_of(&mut scratch.numbers, particles.len());
         dispatch!(rules.level, simd => number(simd, &rules.places, particles, first_block, numbers));
-        let starts = &mut scratch.block_starts;
-        starts.clear();
-        starts.resize(self.blocks.len() + 1, 0);
+        scratch.block_starts.clear();
+        scratch.block_starts.resize(self.blocks.len() + 1, 0);
+        let starts = &mut scratch.block_starts[..];
         for number in &*numbers {
             starts[*number as usize + 1] += 1;
         }
         for b in 0..self.blocks.len() {
             starts[b + 1] += starts[b];
         }
-        scratch.next.clone_from(starts);
+        scratch.next.clear();
+        scratch.next.extend_from_slice(starts);
         place(
             particles,
             numbers,
@@ -83,7 +84,7 @@ impl Bucket<'_> {
             first_of(&mut scratch.particles, particles.len()),
         );
         if !self.radii.is_empty() {
-            scratch.next.clone_from(starts);
+            scratch.next.copy_from_slice(starts);
             let radii = first_of(&mut scratch.radii, self.radii.len());
             place(self.radii, numbers, &mut scratch.next, radii);
         }
