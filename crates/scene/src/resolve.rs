@@ -6,7 +6,7 @@ use crate::bounds::Bounds;
 use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
-use crate::scene::{Camera, Image, Light, Overlay, RelativeTo, Scene, Spheres, System};
+use crate::scene::{Camera, Image, Light, Overlay, Projection, RelativeTo, Scene, Spheres, System};
 
 /// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -49,6 +49,8 @@ pub struct Lights {
     pub occlusion_rays: u32,
     /// How far away something keeps the fill from a surface.
     pub occlusion_radius: f32,
+    /// Directions in which light from other surfaces is looked for, for each sample; 0 for none.
+    pub bounce_rays: u32,
 }
 
 /// A distant round light.
@@ -93,6 +95,7 @@ impl Lights {
             ambient: Vec3::splat(light.ambient as f32),
             occlusion_rays: light.occlusion_rays,
             occlusion_radius: light.occlusion_radius.unwrap_or(diagonal / OCCLUSION_PART) as f32,
+            bounce_rays: light.bounce_rays,
         }
     }
 }
@@ -193,6 +196,12 @@ fn check_camera(camera: &Camera) -> Result<()> {
     let (fov, height, margin) = (camera.fov, camera.height, camera.margin);
     need("camera.fov", fov, fov > 0.0 && fov < 180.0, "degrees above 0 and below 180")?;
     need("camera.height", height, height.is_none_or(positive), "a number above 0")?;
+    let (aperture, focus) = (camera.aperture, camera.focus);
+    let fits = aperture == 0.0 || positive(aperture);
+    need("camera.aperture", aperture, fits, "a number, 0 or more")?;
+    let fits = aperture == 0.0 || camera.projection == Projection::Perspective;
+    need("camera.aperture", aperture, fits, "0, as camera.projection is orthographic")?;
+    need("camera.focus", focus, focus.is_none_or(positive), "a number above 0")?;
     need("camera.margin", margin, (0.0..=0.9).contains(&margin), "a number in 0 to 0.9")?;
     for (path, v) in [("camera.position", camera.position), ("camera.target", camera.target)] {
         let fits = v.is_none_or(|v| v.is_finite());
@@ -215,6 +224,9 @@ fn check_image(image: &Image) -> Result<()> {
     need("image.width × height", pixels, pixels <= MAX_PIXELS, "at most 2^28 pixels in all")?;
     let samples = image.samples;
     need("image.samples", samples, (1..=1024).contains(&samples), "1 to 1024 rays per pixel")?;
+    let most = image.max_samples;
+    need("image.max_samples", most, (1..=1024).contains(&most), "1 to 1024 rays per pixel")?;
+    need("image.noise", image.noise, not_negative(image.noise), "a number, 0 or more")?;
     let e = image.exposure;
     need("image.exposure", e, (-30.0..=30.0).contains(&e), "a number in -30 to 30")
 }
@@ -229,9 +241,12 @@ fn check_light(light: &Light) -> Result<()> {
     for (path, v) in numbers {
         need(path, v, not_negative(v), "a number, 0 or more")?;
     }
-    for (path, rays) in
-        [("light.shadow_rays", light.shadow_rays), ("light.occlusion_rays", light.occlusion_rays)]
-    {
+    let rays = [
+        ("light.shadow_rays", light.shadow_rays),
+        ("light.occlusion_rays", light.occlusion_rays),
+        ("light.bounce_rays", light.bounce_rays),
+    ];
+    for (path, rays) in rays {
         need(path, rays, rays <= 4096, "0 to 4096 rays")?;
     }
     let radius = light.occlusion_radius;
@@ -278,6 +293,12 @@ mod tests {
             (&["camera.margin=1"], "camera.margin"),
             (&["image.samples=0"], "image.samples"),
             (&["image.samples=1025"], "image.samples"),
+            (&["image.max_samples=0"], "image.max_samples"),
+            (&["image.noise=-1"], "image.noise"),
+            (&["camera.aperture=-1"], "camera.aperture"),
+            (&["camera.aperture=1", "camera.projection=orthographic"], "camera.aperture"),
+            (&["camera.focus=0"], "camera.focus"),
+            (&["light.bounce_rays=5000"], "light.bounce_rays"),
             (&["image.width=0"], "image.width"),
             (&["image.height=65536"], "image.height"),
             (&["image.exposure=nan"], "image.exposure"),

@@ -46,6 +46,15 @@ pub(crate) struct Work<'a> {
     pub corner: (u32, u32),
     /// Which of a pixel's samples are the tile's: those from here on.
     pub first_sample: u32,
+    /// How many times all samples were taken before: each lap has directions of its own.
+    pub lap: u32,
+}
+
+impl Work<'_> {
+    /// The turn of the light's samples in a pixel of the tile.
+    pub fn key_turn(&self, (x, y): (u32, u32)) -> u32 {
+        (turn(self.corner.0 + x, self.corner.1 + y) + 25 * self.lap) % TURNS
+    }
 }
 
 /// Finds what reaches the hits of a tile, and keeps its buffers from one to the next.
@@ -208,9 +217,8 @@ impl Occluder {
         for point in 0..self.points.count {
             let (origin, normal) = self.points.get(point);
             let ray = self.points.ray[point] as usize;
-            let (x, y) = work.rays.pattern.pixel_of(ray);
             let first = work.aims.key_set(
-                turn(work.corner.0 + x, work.corner.1 + y),
+                work.key_turn(work.rays.pattern.pixel_of(ray)),
                 work.first_sample + work.rays.pattern.sample(ray),
             );
             for place in first..first + rays {
@@ -276,7 +284,7 @@ impl Occluder {
                 continue;
             }
             let (quarter, sample) = (class / pattern.samples, class % pattern.samples);
-            let directions = aims.fill_set(quarter, work.first_sample + sample);
+            let directions = aims.fill_set((quarter + work.lap) % 4, work.first_sample + sample);
             self.points.pad();
             self.points.clear_sums();
             for direction in directions {

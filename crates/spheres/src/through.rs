@@ -8,9 +8,8 @@ use fearless_simd::prelude::*;
 use fearless_simd_macros::simd;
 use glam::Vec3;
 
-use crate::aims::TURNS;
 use crate::intersect::transmittance;
-use crate::occlude::{Occluder, Sums, Work, lift, share, turn};
+use crate::occlude::{Occluder, Sums, Work, lift, share};
 use crate::packet::{LANES, Packet};
 use crate::tile::{SIDE_BLOCKS, TILE_RAYS};
 use crate::traverse::{Counts, trace_through};
@@ -75,8 +74,7 @@ impl Occluder {
         for ray in work.hits.rays() {
             let normal = work.hits.normal_of(ray);
             let origin = work.hits.position_of(ray) + normal * lift(work, ray);
-            let (x, y) = pattern.pixel_of(ray);
-            let turn = turn(work.corner.0 + x, work.corner.1 + y) % TURNS;
+            let turn = work.key_turn(pattern.pixel_of(ray));
             let first = work.aims.key_set(turn, work.first_sample + pattern.sample(ray));
             for place in first..first + work.aims.key_rays {
                 let direction = work.aims.key_direction(place);
@@ -116,7 +114,9 @@ impl Occluder {
             for (class, rays) in classes.iter().enumerate().filter(|(_, rays)| !rays.is_empty()) {
                 let (quarter, sample) =
                     (class as u32 / pattern.samples, class as u32 % pattern.samples);
-                for direction in work.aims.fill_set(quarter, work.first_sample + sample) {
+                for direction in
+                    work.aims.fill_set((quarter + work.lap) % 4, work.first_sample + sample)
+                {
                     for ray in rays {
                         let normal = work.hits.normal_of(*ray);
                         let cosine = direction.dot(normal);
