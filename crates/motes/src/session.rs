@@ -9,7 +9,7 @@ use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Resolved, Scene, Show};
-use motes_spheres::{Center, Primary, Settings, Spheres, View};
+use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
 use crate::opacity::ALPHA;
@@ -306,6 +306,14 @@ impl Session {
             },
             packet: self.scene.spheres.packet,
             layers,
+            finer: Finer {
+                adaptive: Some(Adaptive {
+                    most: image.max_samples,
+                    noise: image.noise as f32,
+                    exposure: image.exposure.exp2() as f32,
+                }),
+                lens: resolved.view.lens,
+            },
             level,
         };
         let tell = |done, total| watch.progress("render", done, total);

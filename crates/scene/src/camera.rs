@@ -35,6 +35,17 @@ pub struct CameraView {
     pub width: u32,
     /// Height of the picture, pixels.
     pub height: u32,
+    /// The lens of a perspective that is not through a pinhole.
+    pub lens: Option<Lens>,
+}
+
+/// A thin lens at the eye, across the looking direction; world units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Half its diameter.
+    pub radius: f32,
+    /// How far along the looking direction the picture is sharp.
+    pub focus: f32,
 }
 
 /// The camera's rays in f32, relative to an origin near the particles, for kernels.
@@ -135,6 +146,7 @@ impl CameraView {
             half_height: (camera.fov.to_radians() / 2.0).tan(),
             width: size.0,
             height: size.1,
+            lens: None,
         };
         // A box that had to be given an extent stands for all.
         let boxes = if whole == Some(bounds) { framing.boxes } else { &[bounds] };
@@ -144,6 +156,10 @@ impl CameraView {
         match camera.projection {
             Projection::Perspective => view.stand_perspective(camera, &bounds, (&corners, free)),
             Projection::Orthographic => view.stand_orthographic(camera, &bounds, (&corners, free)),
+        }
+        if camera.aperture > 0.0 {
+            let focus = camera.focus.unwrap_or((view.target - view.eye).dot(view.forward));
+            view.lens = Some(Lens { radius: camera.aperture as f32 / 2.0, focus: focus as f32 });
         }
         view
     }

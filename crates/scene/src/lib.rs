@@ -35,7 +35,7 @@ mod settings;
 mod text;
 
 pub use bounds::Bounds;
-pub use camera::{CameraView, Framing, Projected, Rays};
+pub use camera::{CameraView, Framing, Lens, Projected, Rays};
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use colormap::ColorMap;
 pub use elements::Element;

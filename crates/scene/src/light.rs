@@ -28,6 +28,8 @@ pub struct Lights {
     pub occlusion_rays: u32,
     /// How far away something keeps the fill from a surface.
     pub occlusion_radius: f32,
+    /// Directions in which light from other surfaces is looked for, for each sample; 0 for none.
+    pub bounce_rays: u32,
 }
 
 /// The key light: a lamp, or round and so far away that it is the same for every point.
@@ -107,6 +109,7 @@ impl Lights {
             ambient: Vec3::splat(light.ambient as f32),
             occlusion_rays: light.occlusion_rays,
             occlusion_radius: light.occlusion_radius.unwrap_or(diagonal / OCCLUSION_PART) as f32,
+            bounce_rays: light.bounce_rays,
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::light::Lights;
-use crate::scene::{Camera, Film, Image, Light, Overlay, Scene, Spheres, System};
+use crate::scene::{Camera, Film, Image, Light, Overlay, Projection, Scene, Spheres, System};
 
 /// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -129,6 +129,12 @@ fn check_camera(camera: &Camera) -> Result<()> {
     let (fov, height, margin) = (camera.fov, camera.height, camera.margin);
     need("camera.fov", fov, fov > 0.0 && fov < 180.0, "degrees above 0 and below 180")?;
     need("camera.height", height, height.is_none_or(positive), "a number above 0")?;
+    let (aperture, focus) = (camera.aperture, camera.focus);
+    let fits = aperture == 0.0 || positive(aperture);
+    need("camera.aperture", aperture, fits, "a number, 0 or more")?;
+    let fits = aperture == 0.0 || camera.projection == Projection::Perspective;
+    need("camera.aperture", aperture, fits, "0, as camera.projection is orthographic")?;
+    need("camera.focus", focus, focus.is_none_or(positive), "a number above 0")?;
     need("camera.margin", margin, (0.0..=0.9).contains(&margin), "a number in 0 to 0.9")?;
     for (path, v) in [("camera.position", camera.position), ("camera.target", camera.target)] {
         let fits = v.is_none_or(|v| v.is_finite());
@@ -184,6 +190,9 @@ fn check_image(image: &Image) -> Result<()> {
     need("image.width × height", pixels, pixels <= MAX_PIXELS, "at most 2^28 pixels in all")?;
     let samples = image.samples;
     need("image.samples", samples, (1..=1024).contains(&samples), "1 to 1024 rays per pixel")?;
+    let most = image.max_samples;
+    need("image.max_samples", most, (1..=1024).contains(&most), "1 to 1024 rays per pixel")?;
+    need("image.noise", image.noise, not_negative(image.noise), "a number, 0 or more")?;
     let e = image.exposure;
     need("image.exposure", e, (-30.0..=30.0).contains(&e), "a number in -30 to 30")
 }
@@ -202,9 +211,12 @@ fn check_light(light: &Light) -> Result<()> {
     for (path, v) in numbers {
         need(path, v, not_negative(v), "a number, 0 or more")?;
     }
-    for (path, rays) in
-        [("light.shadow_rays", light.shadow_rays), ("light.occlusion_rays", light.occlusion_rays)]
-    {
+    let rays = [
+        ("light.shadow_rays", light.shadow_rays),
+        ("light.occlusion_rays", light.occlusion_rays),
+        ("light.bounce_rays", light.bounce_rays),
+    ];
+    for (path, rays) in rays {
         need(path, rays, rays <= 4096, "0 to 4096 rays")?;
     }
     let radius = light.occlusion_radius;
@@ -251,6 +263,12 @@ mod tests {
             (&["camera.margin=1"], "camera.margin"),
             (&["image.samples=0"], "image.samples"),
             (&["image.samples=1025"], "image.samples"),
+            (&["image.max_samples=0"], "image.max_samples"),
+            (&["image.noise=-1"], "image.noise"),
+            (&["camera.aperture=-1"], "camera.aperture"),
+            (&["camera.aperture=1", "camera.projection=orthographic"], "camera.aperture"),
+            (&["camera.focus=0"], "camera.focus"),
+            (&["light.bounce_rays=5000"], "light.bounce_rays"),
             (&["image.width=0"], "image.width"),
             (&["image.height=65536"], "image.height"),
             (&["image.exposure=nan"], "image.exposure"),

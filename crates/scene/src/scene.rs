@@ -117,6 +117,10 @@ settings! {
         fov: f64 = 35.0,
         /// Height of the picture in world units, for orthographic; none: fits what is visible.
         height: Option<f64> = None => "10.0",
+        /// Diameter of the lens, in world units: what lies off the focus is blurred; 0: a pinhole. Perspective only.
+        aperture: f64 = 0.0,
+        /// Distance along the view at which the picture is sharp, in world units; none: the target's.
+        focus: Option<f64> = None => "40.0",
         /// Free space around what is framed, as a part of half the picture.
         margin: f64 = 0.05,
         /// Degrees the camera goes around the target in a film, about the up axis, to the right: 360 ends where it began.
@@ -165,8 +169,12 @@ settings! {
         height: u32 = 1080,
         /// Which frame of the sources is shown, counted from 0.
         frame: u32 = 0,
-        /// Rays per pixel.
+        /// Rays per pixel, at the least.
         samples: u32 = 4,
+        /// Rays per pixel where they differ, at the most; no more than samples: none differ.
+        max_samples: u32 = 16,
+        /// How much the mean of a pixel's rays may still vary, as a standard error of what is shown, white being 1; 0, or with one sample: nothing is asked.
+        noise: f64 = 0.02,
         /// Leaves the background out: alpha 0 where nothing is.
         transparent: bool = false,
         /// Background colour; at the top, if background_bottom differs.
@@ -211,6 +219,8 @@ settings! {
         occlusion_rays: u32 = 4,
         /// How far something may be to keep fill light away, in world units; none: a sixth of the diagonal of what is visible.
         occlusion_radius: Option<f64> = None => "1.0",
+        /// Directions in which light from other surfaces is looked for (one diffuse bounce), for each sample of a pixel; 0: none.
+        bounce_rays: u32 = 0,
         /// Light from everywhere alike, which no shape shows.
         ambient: f64 = 0.0,
     }

@@ -16,8 +16,8 @@ pub(crate) const TURNS: u32 = 64;
 /// The directions of shadow and occlusion rays.
 #[derive(Debug)]
 pub(crate) struct Aims {
-    /// Samples of a pixel, over all rounds.
-    samples: u32,
+    /// Samples of a pixel, over all rounds of a lap.
+    pub samples: u32,
     /// Towards the key light: for each turn and each sample, its rays.
     key: Vec<Vec3>,
     /// The part of the light each of them leads to: of its area, and around it, in turns.
@@ -155,7 +155,7 @@ impl Cap {
 }
 
 /// The golden angle, in turns.
-const GOLDEN_TURN: f32 = 0.381_966;
+pub(crate) const GOLDEN_TURN: f32 = 0.381_966;
 
 /// Part `place` of `places` of a round light: parts of equal area along a Fibonacci spiral, turned as a
 /// whole.

@@ -14,10 +14,12 @@
 
 mod aims;
 mod beam;
+mod bounce;
 mod frustum;
 mod hits;
 mod intersect;
 mod lanes;
+mod lens;
 mod near;
 mod occlude;
 mod overview;
@@ -26,6 +28,7 @@ mod peel;
 mod picture;
 mod project;
 pub mod reference;
+mod refine;
 mod render;
 #[cfg(test)]
 mod secondary_tests;
@@ -39,6 +42,7 @@ pub use frustum::{Bounds, Frustum};
 pub use intersect::{Sphere, farthest, intersect};
 pub use packet::{LANES, MOST_RAYS, Packet, Surface};
 pub use picture::{Picture, render};
-pub use render::{Center, Primary, Renderer, Settings, Sink, Tile, View};
+pub use refine::Adaptive;
+pub use render::{Center, Finer, Primary, Renderer, Settings, Sink, Tile, View};
 pub use shade::Paint;
 pub use traverse::{Counts, Spheres, trace};

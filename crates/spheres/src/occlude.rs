@@ -49,9 +49,16 @@ pub(crate) struct Work<'a> {
     pub corner: (u32, u32),
     /// Which of a pixel's samples are the tile's: those from here on.
     pub first_sample: u32,
+    /// How many times all samples were taken before: each lap has directions of its own.
+    pub lap: u32,
 }
 
 impl Work<'_> {
+    /// The turn of the light's samples in a pixel of the tile.
+    pub fn key_turn(&self, (x, y): (u32, u32)) -> u32 {
+        (turn(self.corner.0 + x, self.corner.1 + y) + 25 * self.lap) % TURNS
+    }
+
     /// Direction and reach of the shadow ray of a place, where the light is seen as `toward`.
     #[inline(always)]
     pub fn shadow_ray(&self, place: usize, toward: Toward) -> (Vec3, f32) {
@@ -65,8 +72,7 @@ impl Work<'_> {
     /// Where the directions of the shadow rays of a hit begin.
     #[inline(always)]
     pub fn key_set(&self, ray: usize) -> usize {
-        let (x, y) = self.rays.pattern.pixel_of(ray);
-        let turn = turn(self.corner.0 + x, self.corner.1 + y);
+        let turn = self.key_turn(self.rays.pattern.pixel_of(ray));
         self.aims.key_set(turn, self.first_sample + self.rays.pattern.sample(ray))
     }
 
@@ -441,7 +447,7 @@ impl Occluder {
                 continue;
             }
             let (quarter, sample) = (class / pattern.samples, class % pattern.samples);
-            let directions = aims.fill_set(quarter, work.first_sample + sample);
+            let directions = aims.fill_set((quarter + work.lap) % 4, work.first_sample + sample);
             self.points.pad();
             self.points.clear_sums();
             for direction in directions {
@@ -695,7 +701,7 @@ pub(crate) fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bo
 }
 
 /// Which turn of the light's samples a pixel has: neighbours lie far apart (Roberts' R₂ sequence).
-fn turn(x: u32, y: u32) -> u32 {
+pub(crate) fn turn(x: u32, y: u32) -> u32 {
     let at = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5));
     at >> (32 - TURNS.ilog2())
 }

@@ -5,15 +5,18 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
 use fearless_simd_macros::simd;
-use motes_scene::{Lights, Rays};
+use motes_scene::{Lens, Lights, Rays};
 
 use crate::aims::Aims;
+use crate::bounce::Bounce;
 use crate::hits::Hits;
+use crate::lens::bend;
 use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
 use crate::packet::{MOST_RAYS, NO_SLOT, Packet};
 use crate::peel::Peel;
 use crate::project::project;
+use crate::refine::{Adaptive, Refine};
 use crate::shade::{Canvas, Paint, shade};
 use crate::tile::{Pattern, Place, RayTile};
 use crate::traverse::{Counts, Spheres, trace};
@@ -41,8 +44,19 @@ pub struct Settings {
     pub packet: u32,
     /// Whether depth, normal, id and system are wanted.
     pub layers: bool,
+    /// What makes the picture finer.
+    pub finer: Finer,
     /// The instruction set.
     pub level: Level,
+}
+
+/// What makes a picture finer than its samples through a pinhole. By default, nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finer {
+    /// More samples where they differ.
+    pub adaptive: Option<Adaptive>,
+    /// The lens of a perspective camera, by which the colour is seen; all else is seen by a pinhole.
+    pub lens: Option<Lens>,
 }
 
 /// What is seen, in what light.
@@ -166,6 +180,8 @@ struct Desk {
     hits: Hits,
     occluder: Occluder,
     peel: Peel,
+    bounce: Bounce,
+    refine: Refine,
     color: Vec<[f32; 4]>,
     /// Whether there is no light in `color`.
     blank: bool,
@@ -180,6 +196,8 @@ impl Desk {
             hits: Hits::new(),
             occluder: Occluder::new(),
             peel: Peel::new(),
+            bounce: Bounce::new(),
+            refine: Refine::new(),
             color: Vec::new(),
             blank: true,
             center: Vec::new(),
@@ -192,12 +210,26 @@ impl Desk {
     }
 }
 
+/// Samples that are taken together: those of a pattern, in a part of an area.
+struct Round {
+    area: usize,
+    place: Place,
+    part: Place,
+    pattern: Pattern,
+    /// The pattern's first among the samples of a pixel.
+    first_sample: u32,
+    /// How many times all samples were taken before.
+    lap: usize,
+    lens: Option<Lens>,
+}
+
 /// One picture: what is the same for all of its areas.
 struct Plan<'a> {
     view: View<'a>,
     settings: Settings,
-    /// Where the samples of a pixel lie, in rounds of 16, 4 or 1.
-    rounds: Vec<Pattern>,
+    /// Where the samples of a pixel lie, in rounds of 16, 4 or 1; again for each lap, if more may be
+    /// needed.
+    laps: Vec<Vec<Pattern>>,
     /// Per system, the groups of blocks that may be seen; and per area, which of them may show in it,
     /// nearest first.
     groups: Vec<Vec<GroupView>>,
@@ -208,17 +240,14 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     fn new(view: View<'a>, settings: Settings) -> Self {
         let offsets = sample_offsets(settings.samples);
-        let mut rounds = Vec::new();
-        let mut left = &offsets[..];
-        while !left.is_empty() {
-            let pattern = Pattern::of(left);
-            rounds.push(pattern);
-            left = &left[pattern.samples as usize..];
-        }
+        // One sample alone does not tell how sure it is.
+        let adaptive = settings.finer.adaptive.filter(|a| a.noise > 0.0 && settings.samples > 1);
+        let laps = adaptive.map_or(1, |a| (a.most / settings.samples).max(1));
+        let laps = (0..laps).map(|lap| rounds(&shifted(&offsets, lap))).collect();
         let mut plan = Self {
             view,
             settings,
-            rounds,
+            laps,
             groups: Vec::new(),
             shown: Vec::new(),
             aims: Aims::new(view.lights, settings.samples, view.systems),
@@ -279,27 +308,35 @@ impl<'a> Plan<'a> {
             desk.center.resize(pixels, Center::NOTHING);
         }
         let projected = self.settings.primary == Primary::Project;
+        // What is out of focus shows where it would not be.
+        let projected = projected && self.settings.finer.lens.is_none();
         if projected && self.shown.iter().all(|shown| shown[area].is_empty()) {
             return;
         }
-        let mut first_sample = 0;
-        for pattern in &self.rounds {
-            for part in parts(place, pattern.tile_side()) {
-                self.first_hits(simd, (area, part, *pattern), desk, counts);
-                if desk.hits.gather(simd, &desk.rays, self.view.systems) == 0 {
-                    continue;
+        let adaptive = self.settings.finer.adaptive.filter(|_| self.laps.len() > 1);
+        desk.refine.begin(if adaptive.is_some() { pixels } else { 0 });
+        for lap in 0..self.laps.len() {
+            let mut first_sample = 0;
+            for pattern in &self.laps[lap] {
+                for part in parts(place, pattern.tile_side()) {
+                    let (pattern, lens) = (*pattern, self.settings.finer.lens);
+                    let round = Round { area, place, part, pattern, first_sample, lap, lens };
+                    self.round(simd, &round, desk, counts);
                 }
-                if self.view.paint.translucent() {
-                    self.peel(simd, (place, part, first_sample), desk, counts);
-                } else {
-                    self.light(simd, (place, part, first_sample), desk, counts);
-                }
+                first_sample += pattern.samples;
             }
-            first_sample += pattern.samples;
+            if adaptive.is_some_and(|adaptive| !desk.refine.judge(adaptive.noise)) {
+                break;
+            }
+        }
+        if adaptive.is_some() {
+            desk.refine.level(self.settings.samples, &mut desk.color);
         }
         if self.settings.layers {
             let middle = Pattern::of(&[[0.5; 2]]);
-            self.first_hits(simd, (area, place, middle), desk, counts);
+            let (pattern, lens) = (middle, None);
+            let round = Round { area, place, part: place, pattern, first_sample: 0, lap: 0, lens };
+            self.first_hits(simd, &round, desk, counts);
             desk.hits.gather(simd, &desk.rays, self.view.systems);
             for y in 0..place.size.1 {
                 for x in 0..place.size.0 {
@@ -311,18 +348,46 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// Takes the samples of a round.
+    #[simd]
+    fn round<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
+        let adaptive = self.settings.finer.adaptive.filter(|_| self.laps.len() > 1);
+        if adaptive.is_some() && !desk.refine.begin_part(round.place, round.part) {
+            return;
+        }
+        self.first_hits(simd, round, desk, counts);
+        if desk.hits.gather(simd, &desk.rays, self.view.systems) > 0 {
+            if self.view.paint.translucent() {
+                self.peel(simd, round, desk, counts);
+            } else {
+                self.light(simd, round, desk, counts);
+            }
+        }
+        if let Some(adaptive) = adaptive {
+            let how = (&round.pattern, self.weight(), adaptive.exposure);
+            desk.refine.end_part((round.place, round.part), how, &mut desk.color);
+        }
+    }
+
+    /// What each sample counts, were they no more than asked for.
+    fn weight(&self) -> f32 {
+        1.0 / self.settings.samples as f32
+    }
+
     /// Finds what the rays of a part of an area hit first.
     #[simd]
-    fn first_hits<S: Simd>(
-        &self,
-        simd: S,
-        (area, part, pattern): (usize, Place, Pattern),
-        desk: &mut Desk,
-        counts: &mut Counts,
-    ) {
+    fn first_hits<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
         let Self { view, settings, .. } = self;
+        let Round { area, part, pattern, lap, .. } = *round;
         let rays = &mut desk.rays;
-        rays.aim(simd, view.rays, (part, pattern), None);
+        let finished = (lap > 0).then_some(&desk.refine.finished_here[..]);
+        rays.aim(simd, view.rays, (part, pattern), finished);
+        if let Some(lens) = round.lens {
+            let first_sample = lap as u32 * settings.samples + round.first_sample;
+            bend(rays, (view.rays, lens), (part.corner, first_sample));
+            let how = (view.systems, settings.packet, None);
+            return trace_tile(simd, (rays, &mut desk.packet), how, counts);
+        }
         match settings.primary {
             Primary::Trace => {
                 let how = (view.systems, settings.packet, None);
@@ -343,17 +408,11 @@ impl<'a> Plan<'a> {
 
     /// Adds the light of the hits of a part and of what lies behind them, front to back.
     #[simd]
-    fn peel<S: Simd>(
-        &self,
-        simd: S,
-        at: (Place, Place, u32),
-        desk: &mut Desk,
-        counts: &mut Counts,
-    ) {
+    fn peel<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
         desk.peel.begin();
         loop {
             desk.peel.weigh(&desk.rays, &desk.hits, self.view.paint);
-            self.light(simd, at, desk, counts);
+            self.light(simd, round, desk, counts);
             let Desk { rays, hits, peel, packet, .. } = &mut *desk;
             if !peel.goes_on(rays, hits) {
                 return;
@@ -368,17 +427,12 @@ impl<'a> Plan<'a> {
 
     /// Adds the light of the hits of a part to the colours of its area.
     #[simd]
-    fn light<S: Simd>(
-        &self,
-        simd: S,
-        (place, part, first_sample): (Place, Place, u32),
-        desk: &mut Desk,
-        counts: &mut Counts,
-    ) {
+    fn light<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
         desk.blank = false;
-        let Desk { rays, hits, occluder, peel, color, .. } = desk;
+        let Desk { rays, hits, occluder, peel, bounce, refine, color, .. } = desk;
         let translucent = self.view.paint.translucent();
-        let weight = 1.0 / self.settings.samples as f32;
+        let Round { place, part, first_sample, lap, .. } = *round;
+        let bounces = self.view.lights.bounce_rays > 0;
         let work = Work {
             rays,
             hits,
@@ -386,18 +440,24 @@ impl<'a> Plan<'a> {
             aims: &self.aims,
             corner: part.corner,
             first_sample,
+            lap: lap as u32,
         };
         if translucent {
             occluder.reach_through(simd, work, counts);
         } else {
             occluder.reach(simd, work, counts);
         }
+        if bounces {
+            bounce.gather(simd, work, counts);
+        }
         let canvas = Canvas {
             color,
             width: place.size.0,
             at: (part.corner.0 - place.corner.0, part.corner.1 - place.corner.1),
-            weight,
+            weight: self.weight(),
             parts: translucent.then_some(&peel.part),
+            bounced: bounces.then_some(&bounce.light),
+            rays: (self.laps.len() > 1).then_some(&mut refine.rays[..]),
         };
         shade(simd, (rays, hits, &occluder.reaching), self.view, canvas);
     }
@@ -463,6 +523,24 @@ fn trace_tile<S: Simd>(
             }
         }
     }
+}
+
+/// The samples in rounds of 16, 4 or 1.
+fn rounds(mut left: &[[f32; 2]]) -> Vec<Pattern> {
+    let mut rounds = Vec::new();
+    while !left.is_empty() {
+        let pattern = Pattern::of(left);
+        rounds.push(pattern);
+        left = &left[pattern.samples as usize..];
+    }
+    rounds
+}
+
+/// The samples as a lap takes them: moved within the pixel along Roberts' R₂ sequence, so that those of
+/// all laps lie between each other.
+fn shifted(offsets: &[[f32; 2]], lap: u32) -> Vec<[f32; 2]> {
+    let [x, y] = [0.754_877_7, 0.569_840_3].map(|step: f32| lap as f32 * step);
+    offsets.iter().map(|o| [(o[0] + x).fract(), (o[1] + y).fract()]).collect()
 }
 
 /// Where in the pixel its samples lie, each in 0..1: the centre; a rotated square; else a Fibonacci

@@ -10,6 +10,7 @@ use glam::Vec3;
 use crate::hits::Hits;
 use crate::lanes::Lanes;
 use crate::packet::LANES;
+use crate::refine::Refine;
 use crate::render::View;
 use crate::tile::{Pattern, RayTile, SIDE_BLOCKS, TILE_RAYS};
 
@@ -46,6 +47,10 @@ pub(crate) struct Canvas<'a> {
     pub weight: f32,
     /// Of each ray, the part of its sample that this surface makes; none: the whole.
     pub parts: Option<&'a [f32]>,
+    /// Light that comes by way of other surfaces, if it is looked for.
+    pub bounced: Option<&'a [Lanes<f32>; 3]>,
+    /// Where the light of single rays is added up instead, if their pixels' samples are compared.
+    pub rays: Option<&'a mut [[f32; 4]]>,
 }
 
 /// Adds the light of a tile's hits to the canvas.
@@ -88,7 +93,7 @@ pub(crate) fn shade<S: Simd>(
         let fill = f32x16::from_slice(simd, &reaching.fill[lanes.clone()]);
         let weight = match canvas.parts {
             None => f32x16::splat(simd, canvas.weight),
-            Some(parts) => f32x16::from_slice(simd, &parts[lanes]) * canvas.weight,
+            Some(parts) => f32x16::from_slice(simd, &parts[lanes.clone()]) * canvas.weight,
         };
         let up = nz * lights.up.z + ny * lights.up.y + nx * lights.up.x;
         let above = half * up + half;
@@ -97,7 +102,11 @@ pub(crate) fn shade<S: Simd>(
         let mut light = [zero; 4];
         for channel in 0..3 {
             let of_fill = above * sky[channel] + lights.ground[channel];
-            let sum = key * lights.key.color[channel] + of_fill * fill + lights.ambient[channel];
+            let mut sum =
+                key * lights.key.color[channel] + of_fill * fill + lights.ambient[channel];
+            if let Some(bounced) = canvas.bounced {
+                sum += f32x16::from_slice(simd, &bounced[channel][lanes.clone()]);
+            }
             let albedo = f32x16::from_slice(simd, &albedo[channel]);
             light[channel] = hit.select(sum * albedo * weight, zero);
         }
@@ -123,6 +132,9 @@ impl Canvas<'_> {
         third.store_slice(&mut numbers[2 * LANES..3 * LANES]);
         fourth.store_slice(&mut numbers[3 * LANES..]);
 
+        if let Some(rays) = &mut self.rays {
+            return Refine::add(rays, block, &by_ray);
+        }
         let side = pattern.side as usize;
         let samples = pattern.samples as usize;
         let (x, y) = (block % SIDE_BLOCKS * side, block / SIDE_BLOCKS * side);

@@ -4,7 +4,7 @@ use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, Radii, RadiusClasses, Visibility};
 use motes_scene::{Lamp, Lights, Projection, Rays, Scene};
-use motes_spheres::{Paint, Picture, Primary, Settings, Spheres, View, render};
+use motes_spheres::{Finer, Paint, Picture, Primary, Settings, Spheres, View, render};
 
 const SIZE: (u32, u32) = (96, 80);
 
@@ -47,6 +47,7 @@ fn settings(samples: u32) -> Settings {
         primary: Primary::Project,
         packet: 8,
         layers: true,
+        finer: Finer::default(),
         level: Level::new(),
     }
 }

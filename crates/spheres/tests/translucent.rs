@@ -5,8 +5,8 @@ use glam::Vec3;
 use motes_grid::{Params, Radii, RadiusClasses, Visibility};
 use motes_scene::{Lights, Projection, Rays, Scene};
 use motes_spheres::{
-    Counts, Packet, Paint, Picture, Primary, Settings, Sphere, Spheres, Surface, View, intersect,
-    render, trace,
+    Counts, Finer, Packet, Paint, Picture, Primary, Settings, Sphere, Spheres, Surface, View,
+    intersect, render, trace,
 };
 
 const SIZE: (u32, u32) = (41, 41);
@@ -158,7 +158,8 @@ fn picture(
     let rays = rays();
     let view = View { rays: &rays, systems: &systems, paint, lights };
     let level = Level::new();
-    let settings = Settings { size: SIZE, samples: 4, primary, packet, layers: true, level };
+    let finer = Finer::default();
+    let settings = Settings { size: SIZE, samples: 4, primary, packet, layers: true, finer, level };
     render(view, settings, &|_, _| true).unwrap()
 }
 
