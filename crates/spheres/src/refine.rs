@@ -46,10 +46,10 @@ impl Moments {
     #[inline(always)]
     fn add(&mut self, sample: [f32; 4], exposure: f32) {
         self.count += 1;
-        for channel in 0..4 {
+        for (channel, light) in sample.into_iter().enumerate() {
             // The fourth is how much of the pixel is covered, whatever the exposure.
             let scale = if channel == 3 { 1.0 } else { exposure };
-            let value = (sample[channel] * scale).min(1.0);
+            let value = (light * scale).min(1.0);
             self.sum[channel] += value;
             self.squares[channel] += value * value;
         }

@@ -536,11 +536,14 @@ fn rounds(mut left: &[[f32; 2]]) -> Vec<Pattern> {
     rounds
 }
 
-/// The samples as a lap takes them: moved within the pixel along Roberts' R₂ sequence, so that those of
-/// all laps lie between each other.
+/// The samples as a lap takes them: moved within the pixel by halves, quarters, … along rows, so that
+/// those of all laps fill the places between, and by less than a sample's own share along both (Roberts'
+/// R₂ sequence), so that no two laps share a row or column.
 fn shifted(offsets: &[[f32; 2]], lap: u32) -> Vec<[f32; 2]> {
-    let [x, y] = [0.754_877_7, 0.569_840_3].map(|step: f32| lap as f32 * step);
-    offsets.iter().map(|o| [(o[0] + x).fract(), (o[1] + y).fract()]).collect()
+    let halves = lap.reverse_bits() as f32 / (1u64 << 32) as f32;
+    let share = |step: f32| ((lap as f32 * step + 0.5).fract() - 0.5) / offsets.len() as f32;
+    let (x, y) = (halves + share(0.754_877_7), share(0.569_840_3));
+    offsets.iter().map(|o| [(o[0] + x).rem_euclid(1.0), (o[1] + y).rem_euclid(1.0)]).collect()
 }
 
 /// Where in the pixel its samples lie, each in 0..1: the centre; a rotated square; else a Fibonacci
@@ -572,6 +575,21 @@ mod tests {
                 let mean = offsets.iter().map(|o| o[axis]).sum::<f32>() / n as f32;
                 assert!((mean - 0.5).abs() < 0.2 / (n as f32).sqrt(), "{n}: {mean}");
             }
+        }
+    }
+
+    #[test]
+    fn laps_fill_what_others_leave() {
+        let base = sample_offsets(4);
+        assert_eq!(shifted(&base, 0), base);
+        let all: Vec<[f32; 2]> = (0..4).flat_map(|lap| shifted(&base, lap)).collect();
+        // One of the sixteen in every sixteenth of the pixel.
+        let mut cells: Vec<[u32; 2]> = all.iter().map(|o| o.map(|v| (4.0 * v) as u32)).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        assert_eq!(cells.len(), 16, "{all:?}");
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| (0..2).all(|k| (a[k] - b[k]).abs() > 0.01)), "{all:?}");
         }
     }
 

@@ -125,7 +125,7 @@ fn dust_comes_nearer_the_truth_and_stays_so_when_it_moves() {
         let few = of(rays, 4, Finer::default());
         let more = of(rays, 4, adaptive(32, 0.01));
         let (before, after) = (error(&few, &truth, &few), error(&more, &truth, &few));
-        assert!(after < 0.5 * before, "{after} of {before}");
+        assert!(after < 0.6 * before, "{after} of {before}");
     }
 }
 
