@@ -5,10 +5,8 @@ use glam::Vec3;
 use motes_scene::{Lights, Toward};
 
 use crate::lanes::Lanes;
-use crate::near::Shelves;
 use crate::packet::LANES;
 use crate::shaft::Cone;
-use crate::traverse::Spheres;
 
 /// Turns of the light's samples that neighbouring pixels differ by: a power of two.
 pub(crate) const TURNS: u32 = 64;
@@ -16,7 +14,7 @@ pub(crate) const TURNS: u32 = 64;
 /// The directions of shadow and occlusion rays.
 #[derive(Debug)]
 pub(crate) struct Aims {
-    /// Samples of a pixel, over all rounds of a lap.
+    /// Samples of a pixel, over all rounds.
     pub samples: u32,
     /// Towards the key light: for each turn and each sample, its rays.
     key: Vec<Vec3>,
@@ -34,13 +32,11 @@ pub(crate) struct Aims {
     pub fill_rays: usize,
     /// How far occlusion rays reach.
     pub reach: f32,
-    /// Where the blocks of the grids lie, if there are occlusion rays.
-    pub shelves: Shelves,
 }
 
 impl Aims {
     /// The directions for pixels of `samples` samples.
-    pub fn new(lights: &Lights, samples: u32, systems: &[Spheres<'_>]) -> Self {
+    pub fn new(lights: &Lights, samples: u32) -> Self {
         let light = Cap::new(lights.key.direction, lights.key.cos_half_angle);
         let key_rays = lights.key.shadow_rays;
         let (mut key, mut key_parts) = (Vec::new(), Vec::new());
@@ -83,7 +79,6 @@ impl Aims {
             fill,
             fill_rays: fill_rays as usize,
             reach: lights.occlusion_radius,
-            shelves: Shelves::new(if fill_rays > 0 { systems } else { &[] }),
         }
     }
 

@@ -20,7 +20,7 @@ use motes_scene::{KeyLight, Projection, Toward};
 use crate::aims::{Aims, TURNS};
 use crate::beam::{Beam, MOST};
 use crate::hits::Hits;
-use crate::near::Near;
+use crate::near::{Near, Shelves};
 use crate::packet::{LANES, Packet};
 use crate::render::View;
 use crate::shade::Reaching;
@@ -49,14 +49,14 @@ pub(crate) struct Work<'a> {
     pub corner: (u32, u32),
     /// Which of a pixel's samples are the tile's: those from here on.
     pub first_sample: u32,
-    /// How many times all samples were taken before: each lap has directions of its own.
-    pub lap: u32,
+    /// Where the blocks of the grids lie.
+    pub shelves: &'a Shelves,
 }
 
 impl Work<'_> {
     /// The turn of the light's samples in a pixel of the tile.
     pub fn key_turn(&self, (x, y): (u32, u32)) -> u32 {
-        (turn(self.corner.0 + x, self.corner.1 + y) + 25 * self.lap) % TURNS
+        turn(self.corner.0 + x, self.corner.1 + y)
     }
 
     /// Direction and reach of the shadow ray of a place, where the light is seen as `toward`.
@@ -437,7 +437,7 @@ impl Occluder {
             let lift = Vec3::splat(lift(work, *ray as usize));
             (low, high) = (low.min(position - lift), high.max(position + lift));
         }
-        self.near.find(simd, &aims.shelves, (low, high), aims.reach);
+        self.near.find(simd, work.shelves, (low, high), aims.reach);
         for class in 0..classes {
             self.points.clear();
             for (_, ray) in self.order[from..to].iter().filter(|(_, ray)| class_of(*ray) == class) {
@@ -447,13 +447,13 @@ impl Occluder {
                 continue;
             }
             let (quarter, sample) = (class / pattern.samples, class % pattern.samples);
-            let directions = aims.fill_set((quarter + work.lap) % 4, work.first_sample + sample);
+            let directions = aims.fill_set(quarter, work.first_sample + sample);
             self.points.pad();
             self.points.clear_sums();
             for direction in directions {
                 self.points.aim(simd, *direction, &mut self.beam);
                 if self.beam.rays > 0 {
-                    let near = (&self.near, &work.aims.shelves);
+                    let near = (&self.near, work.shelves);
                     self.beam.block(simd, (*direction, aims.reach), near, (systems, counts));
                     self.points.gather(simd, &self.beam);
                 }

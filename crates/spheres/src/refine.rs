@@ -1,8 +1,8 @@
 //! More samples where they differ: adaptive antialiasing.
 //!
-//! A picture is made in laps, each of all its samples, shifted within the pixel. After a lap a pixel is
-//! finished if the standard error of its mean, s/√n with s² the variance of its n samples, is no more than
-//! the tolerance once it is shown. What shows light x goes about as √x, so that an error e of a mean m is
+//! Every pixel gets its samples. Where the standard error of their mean, s/√n with s² the variance of the n
+//! samples, is more than the tolerance once it is shown, the pixel gets the greatest number of samples
+//! instead, as if all pixels had it. What shows light x goes about as √x, so that an error e of a mean m is
 //! seen as e/(2√m). Each pixel is judged by its own samples alone, so that tiles and threads do not
 //! matter.
 
@@ -118,24 +118,17 @@ impl Refine {
         }
     }
 
-    /// Judges all pixels. Gives whether any needs more.
-    pub fn judge(&mut self, noise: f32) -> bool {
+    /// Judges all pixels, and clears the colours of those that need more. Gives whether there are any.
+    pub fn judge(&mut self, noise: f32, color: &mut [[f32; 4]]) -> bool {
         let mut any = false;
-        for (finished, pixel) in self.finished.iter_mut().zip(&self.pixels) {
-            *finished |= pixel.is_certain(noise);
-            any |= !*finished;
-        }
-        any
-    }
-
-    /// Makes the sums of `color`, in which each of `samples` samples counted its part, to means.
-    pub fn level(&self, samples: u32, color: &mut [[f32; 4]]) {
-        for (color, pixel) in color.iter_mut().zip(&self.pixels) {
-            if pixel.count != samples {
-                let scale = samples as f32 / pixel.count as f32;
-                color.iter_mut().for_each(|c| *c *= scale);
+        for ((finished, pixel), color) in self.finished.iter_mut().zip(&self.pixels).zip(color) {
+            *finished = pixel.is_certain(noise);
+            if !*finished {
+                *color = [0.0; 4];
+                any = true;
             }
         }
+        any
     }
 
     /// Adds the light of a block's rays.

@@ -11,6 +11,7 @@ use crate::aims::Aims;
 use crate::bounce::Bounce;
 use crate::hits::Hits;
 use crate::lens::bend;
+use crate::near::Shelves;
 use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
 use crate::packet::{MOST_RAYS, NO_SLOT, Packet};
@@ -218,8 +219,8 @@ struct Round {
     pattern: Pattern,
     /// The pattern's first among the samples of a pixel.
     first_sample: u32,
-    /// How many times all samples were taken before.
-    lap: usize,
+    /// Which of the plan's courses it belongs to.
+    course: usize,
     lens: Option<Lens>,
 }
 
@@ -227,30 +228,46 @@ struct Round {
 struct Plan<'a> {
     view: View<'a>,
     settings: Settings,
-    /// Where the samples of a pixel lie, in rounds of 16, 4 or 1; again for each lap, if more may be
-    /// needed.
-    laps: Vec<Vec<Pattern>>,
+    /// What every pixel gets; and what those get instead whose samples differ.
+    courses: Vec<Course>,
+    /// Where the blocks of the grids lie, if there are occlusion rays.
+    shelves: Shelves,
     /// Per system, the groups of blocks that may be seen; and per area, which of them may show in it,
     /// nearest first.
     groups: Vec<Vec<GroupView>>,
     shown: Vec<Vec<Vec<u32>>>,
+}
+
+/// The samples of a pixel.
+struct Course {
+    samples: u32,
+    /// Where they lie, in rounds of 16, 4 or 1.
+    rounds: Vec<Pattern>,
+    /// Where their secondary rays go.
     aims: Aims,
+}
+
+impl Course {
+    fn new(samples: u32, lights: &Lights) -> Self {
+        let offsets = sample_offsets(samples);
+        Self { samples, rounds: rounds(&offsets), aims: Aims::new(lights, samples) }
+    }
 }
 
 impl<'a> Plan<'a> {
     fn new(view: View<'a>, settings: Settings) -> Self {
-        let offsets = sample_offsets(settings.samples);
         // One sample alone does not tell how sure it is.
         let adaptive = settings.finer.adaptive.filter(|a| a.noise > 0.0 && settings.samples > 1);
-        let laps = adaptive.map_or(1, |a| (a.most / settings.samples).max(1));
-        let laps = (0..laps).map(|lap| rounds(&shifted(&offsets, lap))).collect();
+        let more = adaptive.map(|a| a.most).filter(|most| *most > settings.samples);
+        let samples = std::iter::once(settings.samples).chain(more);
+        let occluded = view.lights.occlusion_rays > 0;
         let mut plan = Self {
             view,
             settings,
-            laps,
+            courses: samples.map(|samples| Course::new(samples, view.lights)).collect(),
+            shelves: Shelves::new(if occluded { view.systems } else { &[] }),
             groups: Vec::new(),
             shown: Vec::new(),
-            aims: Aims::new(view.lights, settings.samples, view.systems),
         };
         if settings.primary == Primary::Project {
             for spheres in view.systems {
@@ -313,29 +330,28 @@ impl<'a> Plan<'a> {
         if projected && self.shown.iter().all(|shown| shown[area].is_empty()) {
             return;
         }
-        let adaptive = self.settings.finer.adaptive.filter(|_| self.laps.len() > 1);
+        let adaptive = self.adaptive();
         desk.refine.begin(if adaptive.is_some() { pixels } else { 0 });
-        for lap in 0..self.laps.len() {
+        for (course, Course { rounds, .. }) in self.courses.iter().enumerate() {
             let mut first_sample = 0;
-            for pattern in &self.laps[lap] {
+            for pattern in rounds {
                 for part in parts(place, pattern.tile_side()) {
                     let (pattern, lens) = (*pattern, self.settings.finer.lens);
-                    let round = Round { area, place, part, pattern, first_sample, lap, lens };
+                    let round = Round { area, place, part, pattern, first_sample, course, lens };
                     self.round(simd, &round, desk, counts);
                 }
                 first_sample += pattern.samples;
             }
-            if adaptive.is_some_and(|adaptive| !desk.refine.judge(adaptive.noise)) {
+            let again = course + 1 < self.courses.len();
+            if again && !desk.refine.judge(adaptive.map_or(0.0, |a| a.noise), &mut desk.color) {
                 break;
             }
-        }
-        if adaptive.is_some() {
-            desk.refine.level(self.settings.samples, &mut desk.color);
         }
         if self.settings.layers {
             let middle = Pattern::of(&[[0.5; 2]]);
             let (pattern, lens) = (middle, None);
-            let round = Round { area, place, part: place, pattern, first_sample: 0, lap: 0, lens };
+            let round =
+                Round { area, place, part: place, pattern, first_sample: 0, course: 0, lens };
             self.first_hits(simd, &round, desk, counts);
             desk.hits.gather(simd, &desk.rays, self.view.systems);
             for y in 0..place.size.1 {
@@ -351,7 +367,7 @@ impl<'a> Plan<'a> {
     /// Takes the samples of a round.
     #[simd]
     fn round<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
-        let adaptive = self.settings.finer.adaptive.filter(|_| self.laps.len() > 1);
+        let adaptive = self.adaptive();
         if adaptive.is_some() && !desk.refine.begin_part(round.place, round.part) {
             return;
         }
@@ -364,26 +380,30 @@ impl<'a> Plan<'a> {
             }
         }
         if let Some(adaptive) = adaptive {
-            let how = (&round.pattern, self.weight(), adaptive.exposure);
+            let how = (&round.pattern, self.weight(round), adaptive.exposure);
             desk.refine.end_part((round.place, round.part), how, &mut desk.color);
         }
     }
 
-    /// What each sample counts, were they no more than asked for.
-    fn weight(&self) -> f32 {
-        1.0 / self.settings.samples as f32
+    /// How pixels are judged, if any may get more samples.
+    fn adaptive(&self) -> Option<Adaptive> {
+        self.settings.finer.adaptive.filter(|_| self.courses.len() > 1)
+    }
+
+    /// What each sample of a round counts.
+    fn weight(&self, round: &Round) -> f32 {
+        1.0 / self.courses[round.course].samples as f32
     }
 
     /// Finds what the rays of a part of an area hit first.
     #[simd]
     fn first_hits<S: Simd>(&self, simd: S, round: &Round, desk: &mut Desk, counts: &mut Counts) {
         let Self { view, settings, .. } = self;
-        let Round { area, part, pattern, lap, .. } = *round;
+        let Round { area, part, pattern, course, first_sample, .. } = *round;
         let rays = &mut desk.rays;
-        let finished = (lap > 0).then_some(&desk.refine.finished_here[..]);
+        let finished = (course > 0).then_some(&desk.refine.finished_here[..]);
         rays.aim(simd, view.rays, (part, pattern), finished);
         if let Some(lens) = round.lens {
-            let first_sample = lap as u32 * settings.samples + round.first_sample;
             bend(rays, (view.rays, lens), (part.corner, first_sample));
             let how = (view.systems, settings.packet, None);
             return trace_tile(simd, (rays, &mut desk.packet), how, counts);
@@ -431,16 +451,16 @@ impl<'a> Plan<'a> {
         desk.blank = false;
         let Desk { rays, hits, occluder, peel, bounce, refine, color, .. } = desk;
         let translucent = self.view.paint.translucent();
-        let Round { place, part, first_sample, lap, .. } = *round;
+        let Round { place, part, first_sample, course, .. } = *round;
         let bounces = self.view.lights.bounce_rays > 0;
         let work = Work {
             rays,
             hits,
             view: self.view,
-            aims: &self.aims,
+            aims: &self.courses[course].aims,
+            shelves: &self.shelves,
             corner: part.corner,
             first_sample,
-            lap: lap as u32,
         };
         if translucent {
             occluder.reach_through(simd, work, counts);
@@ -454,10 +474,10 @@ impl<'a> Plan<'a> {
             color,
             width: place.size.0,
             at: (part.corner.0 - place.corner.0, part.corner.1 - place.corner.1),
-            weight: self.weight(),
+            weight: self.weight(round),
             parts: translucent.then_some(&peel.part),
             bounced: bounces.then_some(&bounce.light),
-            rays: (self.laps.len() > 1).then_some(&mut refine.rays[..]),
+            rays: (self.courses.len() > 1).then_some(&mut refine.rays[..]),
         };
         shade(simd, (rays, hits, &occluder.reaching), self.view, canvas);
     }
@@ -536,16 +556,6 @@ fn rounds(mut left: &[[f32; 2]]) -> Vec<Pattern> {
     rounds
 }
 
-/// The samples as a lap takes them: moved within the pixel by halves, quarters, … along rows, so that
-/// those of all laps fill the places between, and by less than a sample's own share along both (Roberts'
-/// R₂ sequence), so that no two laps share a row or column.
-fn shifted(offsets: &[[f32; 2]], lap: u32) -> Vec<[f32; 2]> {
-    let halves = lap.reverse_bits() as f32 / (1u64 << 32) as f32;
-    let share = |step: f32| ((lap as f32 * step + 0.5).fract() - 0.5) / offsets.len() as f32;
-    let (x, y) = (halves + share(0.754_877_7), share(0.569_840_3));
-    offsets.iter().map(|o| [(o[0] + x).rem_euclid(1.0), (o[1] + y).rem_euclid(1.0)]).collect()
-}
-
 /// Where in the pixel its samples lie, each in 0..1: the centre; a rotated square; else a Fibonacci
 /// lattice, which leaves no two samples in one row or column.
 fn sample_offsets(samples: u32) -> Vec<[f32; 2]> {
@@ -575,21 +585,6 @@ mod tests {
                 let mean = offsets.iter().map(|o| o[axis]).sum::<f32>() / n as f32;
                 assert!((mean - 0.5).abs() < 0.2 / (n as f32).sqrt(), "{n}: {mean}");
             }
-        }
-    }
-
-    #[test]
-    fn laps_fill_what_others_leave() {
-        let base = sample_offsets(4);
-        assert_eq!(shifted(&base, 0), base);
-        let all: Vec<[f32; 2]> = (0..4).flat_map(|lap| shifted(&base, lap)).collect();
-        // One of the sixteen in every sixteenth of the pixel.
-        let mut cells: Vec<[u32; 2]> = all.iter().map(|o| o.map(|v| (4.0 * v) as u32)).collect();
-        cells.sort_unstable();
-        cells.dedup();
-        assert_eq!(cells.len(), 16, "{all:?}");
-        for (i, a) in all.iter().enumerate() {
-            assert!(all[..i].iter().all(|b| (0..2).all(|k| (a[k] - b[k]).abs() > 0.01)), "{all:?}");
         }
     }
 

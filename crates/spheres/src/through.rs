@@ -112,9 +112,7 @@ impl Occluder {
             for (class, rays) in classes.iter().enumerate().filter(|(_, rays)| !rays.is_empty()) {
                 let (quarter, sample) =
                     (class as u32 / pattern.samples, class as u32 % pattern.samples);
-                for direction in
-                    work.aims.fill_set((quarter + work.lap) % 4, work.first_sample + sample)
-                {
+                for direction in work.aims.fill_set(quarter, work.first_sample + sample) {
                     for ray in rays {
                         let normal = work.hits.normal_of(*ray);
                         let cosine = direction.dot(normal);

@@ -73,6 +73,7 @@ impl Studio {
             },
             packet: shot.packet,
             layers: false,
+            finer: motes_spheres::Finer::default(),
             level: Level::new(),
         };
         lock(&self.spare).append(&mut lock(&self.finished));
