@@ -248,9 +248,15 @@ struct Course {
 }
 
 impl Course {
-    fn new(samples: u32, lights: &Lights) -> Self {
+    /// A pixel's secondary rays are those of `base` samples, however many samples share them; but every
+    /// sample has one of each kind.
+    fn new(samples: u32, base: u32, lights: &Lights) -> Self {
+        let share = |rays: u32| (u64::from(rays) * u64::from(base)).div_ceil(u64::from(samples));
+        let mut lights = *lights;
+        lights.occlusion_rays = share(lights.occlusion_rays) as u32;
+        lights.key.shadow_rays = share(lights.key.shadow_rays) as u32;
         let offsets = sample_offsets(samples);
-        Self { samples, rounds: rounds(&offsets), aims: Aims::new(lights, samples) }
+        Self { samples, rounds: rounds(&offsets), aims: Aims::new(&lights, samples) }
     }
 }
 
@@ -264,7 +270,7 @@ impl<'a> Plan<'a> {
         let mut plan = Self {
             view,
             settings,
-            courses: samples.map(|samples| Course::new(samples, view.lights)).collect(),
+            courses: samples.map(|n| Course::new(n, settings.samples, view.lights)).collect(),
             shelves: Shelves::new(if occluded { view.systems } else { &[] }),
             groups: Vec::new(),
             shown: Vec::new(),
