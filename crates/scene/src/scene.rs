@@ -172,7 +172,7 @@ settings! {
         /// Rays per pixel, at the least.
         samples: u32 = 4,
         /// Rays per pixel where they differ, which then share the secondary rays of `samples`; no more than samples: none differ.
-        max_samples: u32 = 16,
+        max_samples: u32 = 4,
         /// How much the mean of a pixel's rays may still vary, as a standard error of what is shown, white being 1; 0, or with one sample: nothing is asked.
         noise: f64 = 0.02,
         /// Leaves the background out: alpha 0 where nothing is.
