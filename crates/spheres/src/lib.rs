@@ -5,8 +5,8 @@
 //!
 //! - [`Packet`]: rays and their nearest hits
 //! - [`trace`]: a packet through the grids of the systems
-//! - [`Frustum`], [`intersect`]: its parts, for walks through other structures (the benches compare some)
-//! - [`render`]: a whole picture, tile by tile, on all cores
+//! - [`Frustum`], [`intersect()`]: its parts, for walks through other structures (the benches compare some)
+//! - [`render()`]: a whole picture, tile by tile, on all cores
 //! - [`mod@reference`]: brute force in f64, the definition; for tests
 //!
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
