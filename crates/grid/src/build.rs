@@ -78,7 +78,7 @@ impl Grid {
             assert_eq!(each.len(), positions.len(), "one radius per position");
         }
         let level = Level::new();
-        let source = Source { positions: &positions, radii, chosen };
+        let source = Source { positions, radii, chosen };
         let survey = source.survey(level);
         if survey.count == 0 {
             return Self::empty();
@@ -88,7 +88,10 @@ impl Grid {
 
         let spare = self;
         let mut grid = Self {
-            particles: spare.particles.reused(survey.count),
+            particles: match source.owns() && spare.particles.is_empty() {
+                true => Pages::zeroed_by_and_by(survey.count),
+                false => spare.particles.reused(survey.count),
+            },
             radius: match (radii, spare.radius) {
                 (Radii::Uniform(r), _) => Radii::Uniform(r),
                 (_, Radii::Each(spare)) => Radii::Each(spare.reused(survey.count)),
@@ -102,8 +105,7 @@ impl Grid {
             ..Self::empty()
         };
         let radius = grid.radius.each_mut();
-        scatter(&source, (&survey, &buckets), &mut grid.particles, radius, level);
-        drop(positions);
+        scatter(source, (&survey, &buckets), &mut grid.particles, radius, level);
         let places = Places::of_blocks(&lattice);
         let rules = Rules { lattice: &lattice, places, params, radii, level };
         grid.sort_buckets((&buckets.starts(), &buckets.blocks), &rules);

@@ -3,10 +3,12 @@
 //! A grid enlarges every frustum by its greatest radius (Gribble et al. 2007, §4.1, "Discussion"),
 //! which one huge sphere would spoil for a million small ones.
 
+use std::borrow::Cow;
+
 use crate::{Grid, Params, Radii};
 
 /// The grids of one particle system, greatest radii first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct RadiusClasses {
     /// One grid per class that has particles.
     pub grids: Vec<Grid>,
@@ -18,22 +20,51 @@ pub struct RadiusClasses {
 const CLASS_FACTOR: f32 = 4.0;
 
 impl RadiusClasses {
-    /// Sorts particles into classes and builds a grid for each.
+    /// Sorts particles into classes and builds a grid for each. Positions that are handed over are freed
+    /// as soon as they are no longer needed.
     ///
     /// # Panics
     /// As [`Grid::build`].
-    pub fn build(positions: &[[f32; 3]], radii: Radii<&[f32]>, params: Params) -> Self {
-        let grids: Vec<Grid> = match radii {
+    pub fn build<'a>(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        radii: Radii<&[f32]>,
+        params: Params,
+    ) -> Self {
+        Self::default().rebuild(positions, radii, params)
+    }
+
+    /// [`RadiusClasses::build`] in the memory of grids that are no longer needed.
+    ///
+    /// # Panics
+    /// As [`Grid::build`].
+    pub fn rebuild<'a>(
+        self,
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        radii: Radii<&[f32]>,
+        params: Params,
+    ) -> Self {
+        let mut spare = self.grids.into_iter();
+        let mut positions = positions.into();
+        let count = positions.len();
+        let classes = match radii {
             Radii::Uniform(r) if !drawable(r) => Vec::new(),
-            Radii::Uniform(_) => vec![Grid::build(positions, radii, None, params)],
-            Radii::Each(each) => classes_of(each)
-                .iter()
-                .map(|chosen| Grid::build(positions, radii, chosen.as_deref(), params))
-                .collect(),
+            Radii::Uniform(_) => vec![None],
+            Radii::Each(each) => classes_of(each),
         };
+        let last = classes.len().saturating_sub(1);
+        let build = |(i, chosen): (usize, &Option<Vec<u32>>)| {
+            // The last may let go of them.
+            let positions = match i == last {
+                true => std::mem::take(&mut positions),
+                false => Cow::Borrowed(&*positions),
+            };
+            let spare = spare.next().unwrap_or_else(Grid::empty);
+            spare.rebuild(positions, radii, chosen.as_deref(), params)
+        };
+        let grids: Vec<Grid> = classes.iter().enumerate().map(build).collect();
         let drawn: usize = grids.iter().map(Grid::len).sum();
         let grids = grids.into_iter().filter(|g| !g.is_empty()).collect();
-        Self { grids, left_out: positions.len() - drawn }
+        Self { grids, left_out: count - drawn }
     }
 
     /// How many particles the grids hold.

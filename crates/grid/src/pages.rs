@@ -38,11 +38,16 @@ impl<T: Pod> Pages<T> {
             && align_of::<T>() <= 4096
             && let Ok(map) = MmapMut::map_anon(bytes)
         {
-            // Where the system has no large pages, small ones do.
+            // Where the system has no large pages, others do.
             #[cfg(target_os = "linux")]
             let _ = map.advise(memmap2::Advice::HugePage);
             return Self { store: Store::Mapped(map), len };
         }
+        Self::zeroed_by_and_by(len)
+    }
+
+    /// An array of `len` zeros on ordinary pages: memory is taken no sooner than it is written to.
+    pub fn zeroed_by_and_by(len: usize) -> Self {
         Self { store: Store::Heap(bytemuck::zeroed_vec(len)), len }
     }
 

@@ -4,6 +4,8 @@
 //! thread inserts the particles of its own buckets. The input is cut into chunks; each chunk counts
 //! what it has for each bucket, and so knows its own piece of every bucket. The sort is stable.
 
+use std::borrow::Cow;
+
 use fearless_simd::{Level, dispatch, f32x4, mask32x4, prelude::*, u32x4};
 use fearless_simd_macros::simd;
 use glam::Vec3;
@@ -14,12 +16,13 @@ use crate::streams::{Piece, Streams};
 use crate::{Lattice, Particle, Radii};
 
 /// Pieces the input is cut into. Fixed, though the result does not depend on it.
-const CHUNKS: usize = 16;
+const CHUNKS: usize = 32;
+/// Chunks after which positions that were handed over are let go, the last first.
+const CHUNKS_OF_ROUND: usize = 8;
 
 /// The particles to be sorted, in the file's order.
-#[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
-    pub positions: &'a [[f32; 3]],
+    pub positions: Cow<'a, [[f32; 3]]>,
     /// In the order of `positions`.
     pub radii: Radii<&'a [f32]>,
     /// Which of them; all, if `None`.
@@ -46,6 +49,20 @@ pub(crate) struct Survey {
 impl Source<'_> {
     fn len(&self) -> usize {
         self.chosen.map_or(self.positions.len(), <[u32]>::len)
+    }
+
+    /// Whether the positions were handed over, to be let go one after the other.
+    pub fn owns(&self) -> bool {
+        self.chosen.is_none() && matches!(self.positions, Cow::Owned(_))
+    }
+
+    /// Lets go of all positions but the first `count`.
+    fn keep(&mut self, count: usize) {
+        if self.owns() {
+            let positions = self.positions.to_mut();
+            positions.truncate(count);
+            positions.shrink_to_fit();
+        }
     }
 
     /// The finite ones among items `range`.
@@ -232,33 +249,45 @@ fn count_points<S: Simd>(simd: S, bins: &Bins, points: &[[f32; 3]]) -> Vec<u32> 
 }
 
 /// Scatters the particles of `source` to `particles`, bucket by bucket, and their radii to `radii`
-/// where they differ.
+/// where they differ. Positions that were handed over are gone afterwards.
 pub(crate) fn scatter(
-    source: &Source<'_>,
+    mut source: Source<'_>,
     (survey, buckets): (&Survey, &Buckets),
     particles: &mut [Particle],
     radii: &mut [f32],
     level: Level,
 ) {
-    let pieces = buckets.pieces(particles);
-    match source.radii {
-        Radii::Uniform(_) => {
-            survey.chunks.par_iter().zip(pieces).with_max_len(1).for_each(|(chunk, pieces)| {
-                let mut to = Streams::new(pieces);
-                scatter_chunk(source, (chunk, buckets), &mut to, level);
-                to.finish();
-            });
+    let mut pieces = buckets.pieces(particles);
+    let mut pieces_of_radii = match source.radii {
+        Radii::Each(_) => buckets.pieces(radii),
+        Radii::Uniform(_) => Vec::new(),
+    };
+    let step = if source.owns() { CHUNKS_OF_ROUND } else { CHUNKS };
+    for first in (0..CHUNKS).step_by(step).rev() {
+        let chunks = &survey.chunks[first..];
+        let pieces = pieces.split_off(first);
+        match source.radii {
+            Radii::Uniform(_) => {
+                let work = chunks[..step].par_iter().zip(pieces).with_max_len(1);
+                work.for_each(|(chunk, pieces)| {
+                    let mut to = Streams::new(pieces);
+                    scatter_chunk(&source, (chunk, buckets), &mut to, level);
+                    to.finish();
+                });
+            }
+            Radii::Each(radii_of) => {
+                let pieces = pieces.into_par_iter().zip(pieces_of_radii.split_off(first));
+                let work = chunks[..step].par_iter().zip(pieces).with_max_len(1);
+                work.for_each(|(chunk, (particles, radii))| {
+                    let (particles, radii) = (Streams::new(particles), Streams::new(radii));
+                    let mut to = WithRadii { particles, radii, radii_of };
+                    scatter_chunk(&source, (chunk, buckets), &mut to, level);
+                    to.particles.finish();
+                    to.radii.finish();
+                });
+            }
         }
-        Radii::Each(radii_of) => {
-            let work = pieces.into_par_iter().zip(buckets.pieces(radii));
-            survey.chunks.par_iter().zip(work).with_max_len(1).for_each(|(chunk, work)| {
-                let (particles, radii) = (Streams::new(work.0), Streams::new(work.1));
-                let mut to = WithRadii { particles, radii, radii_of };
-                scatter_chunk(source, (chunk, buckets), &mut to, level);
-                to.particles.finish();
-                to.radii.finish();
-            });
-        }
+        source.keep(chunks[0].range.start);
     }
 }
 

@@ -1,5 +1,6 @@
 //! How large each particle is: the file's radius, else the element's, else half the spacing.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use motes_grid::{Grid, Radii, RadiusClasses};
@@ -36,7 +37,11 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
         .map(|column| per_type(column, |name| system.radii.get(name).map(|r| *r as f32)));
     let rest = match &particles.radius {
         Radius::Uniform(r) => Rule::Uniform(*r),
-        Radius::Each(radii) => Rule::Each(radii.clone()),
+        Radius::Each(radii) => match &radii[..] {
+            // A file may say the same of each.
+            [first, rest @ ..] if rest.iter().all(|r| r == first) => Rule::Uniform(*first),
+            _ => Rule::Each(radii.clone()),
+        },
         Radius::Unknown => types.and_then(of_elements).map_or(Rule::HalfSpacing, Rule::Each),
     };
     let Some(given) = given else { return rest };
@@ -96,38 +101,45 @@ pub(crate) fn per_type<T: Copy>(
     }
 }
 
-/// Builds the grids of a system under its rule.
+/// Builds the grids of a system under its rule, in the memory of others that are no longer needed.
 pub(crate) fn classes(
-    positions: &[[f32; 3]],
+    spare: RadiusClasses,
+    positions: Cow<'_, [[f32; 3]]>,
     rule: Rule,
     scale: f32,
     params: motes_grid::Params,
 ) -> RadiusClasses {
     match rule {
-        Rule::Uniform(r) => RadiusClasses::build(positions, Radii::Uniform(r * scale), params),
+        Rule::Uniform(r) => spare.rebuild(positions, Radii::Uniform(r * scale), params),
         Rule::Each(mut radii) => {
             radii.iter_mut().for_each(|r| *r *= scale);
-            RadiusClasses::build(positions, Radii::Each(&radii), params)
+            spare.rebuild(positions, Radii::Each(&radii), params)
         }
         Rule::HalfSpacing => {
-            let (mut grid, radius) = half_spacing(positions, params);
+            let count = positions.len();
+            let spare = spare.grids.into_iter().next().unwrap_or_else(Grid::empty);
+            let (mut grid, radius) = half_spacing(spare, positions, params);
             grid.set_radius(radius * scale);
-            let left_out = positions.len() - grid.len();
+            let left_out = count - grid.len();
             let grids = if grid.is_empty() { vec![] } else { vec![grid] };
             RadiusClasses { grids, left_out }
         }
         Rule::SomeElseHalfSpacing(radii) => {
-            let (_, other) = half_spacing(positions, params);
+            let (_, other) = half_spacing(Grid::empty(), Cow::Borrowed(&positions), params);
             let radii = radii.into_iter().map(|r| r.unwrap_or(other)).collect();
-            classes(positions, Rule::Each(radii), scale, params)
+            classes(spare, positions, Rule::Each(radii), scale, params)
         }
     }
 }
 
 /// A grid over the positions, and half the median distance between neighbours in it.
-fn half_spacing(positions: &[[f32; 3]], params: motes_grid::Params) -> (Grid, f32) {
+fn half_spacing(
+    spare: Grid,
+    positions: Cow<'_, [[f32; 3]]>,
+    params: motes_grid::Params,
+) -> (Grid, f32) {
     // The least radius there is lets the grid be as fine as λ says.
-    let grid = Grid::build(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
+    let grid = spare.rebuild(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
     let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
     (grid, radius)
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Background, Curve, Frame, Layer, Tone};
+use motes_grid::RadiusClasses;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Resolved, Scene, Show};
@@ -64,11 +65,21 @@ impl Watch for Quiet {
     }
 }
 
+/// What becomes of a frame that was rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum After {
+    /// It may be asked for again.
+    Kept,
+    LetGo,
+}
+
 /// A scene whose sources are open.
 pub struct Session {
     scene: Scene,
     series: Vec<Series>,
     pool: Option<rayon::ThreadPool>,
+    /// The grids of each system's last frame, for the memory they have.
+    spare: Vec<RadiusClasses>,
     /// Whether the view was held for several frames.
     film: bool,
     /// Colour range per system over its whole series, once it was asked for.
@@ -92,7 +103,8 @@ impl Session {
         };
         let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let ranges = vec![None; series.len()];
-        Ok(Self { scene, series, pool, film: false, ranges, notes: Vec::new() })
+        let spare = series.iter().map(|_| RadiusClasses::default()).collect();
+        Ok(Self { scene, series, pool, spare, film: false, ranges, notes: Vec::new() })
     }
 
     /// The scene.
@@ -127,7 +139,21 @@ impl Session {
         watch: &dyn Watch,
     ) -> Result<Picture> {
         let shot = shot.into();
-        self.in_pool(|session| session.render_here(shot, layers, watch))
+        self.in_pool(|session| session.render_here((shot, After::Kept), layers, watch))
+    }
+
+    /// As [`Session::render`], in less memory, for a frame that will not be asked for again.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn render_once(
+        &mut self,
+        shot: impl Into<Shot>,
+        layers: Layers,
+        watch: &dyn Watch,
+    ) -> Result<Picture> {
+        let shot = shot.into();
+        self.in_pool(|session| session.render_here((shot, After::LetGo), layers, watch))
     }
 
     /// Works on the session's own threads, if it was given a number of them.
@@ -143,12 +169,19 @@ impl Session {
         }
     }
 
-    fn render_here(&mut self, shot: Shot, layers: Layers, watch: &dyn Watch) -> Result<Picture> {
+    fn render_here(
+        &mut self,
+        (shot, after): (Shot, After),
+        layers: Layers,
+        watch: &dyn Watch,
+    ) -> Result<Picture> {
         let frame = shot.frame;
         let mut stats = Stats { threads: rayon::current_num_threads(), ..Stats::default() };
         let start = Instant::now();
-        let particles = self.read(frame, watch)?;
+        let particles = self.read(frame, after, watch)?;
         stats.ms.insert("read", milliseconds(start));
+        let input = particles.iter().flatten().map(|p| p.bytes()).sum();
+        stats.bytes.insert("input", input);
 
         let start = Instant::now();
         let (loaded, origin) = self.load(particles)?;
@@ -179,6 +212,7 @@ impl Session {
         count(&mut stats, &loaded);
         stats.hash = format!("{:016x}", raw.hash());
         stats.peak_memory = peak_memory_bytes();
+        loaded.into_iter().for_each(|l| self.spare[l.number as usize] = l.classes);
         Ok(Picture {
             raw,
             shown,
@@ -223,7 +257,7 @@ impl Session {
         looks.dedup();
         let (mut boxes, mut last) = (Vec::new(), Vec::new());
         for frame in looks {
-            let particles = self.read(frame, watch)?;
+            let particles = self.read(frame, After::Kept, watch)?;
             let (loaded, origin) = self.load(particles)?;
             loaded.iter().for_each(|l| l.hold_radius(&mut self.scene));
             boxes.extend(framed(&loaded, origin));
@@ -245,19 +279,25 @@ impl Session {
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
-    fn load(&self, particles: Vec<Option<Arc<Particles>>>) -> Result<(Vec<Loaded>, DVec3)> {
+    fn load(&mut self, particles: Vec<Option<Arc<Particles>>>) -> Result<(Vec<Loaded>, DVec3)> {
         let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
         let mut loaded = Vec::new();
         for (i, particles) in particles.into_iter().enumerate() {
             let Some(particles) = particles else { continue };
+            let spare = std::mem::take(&mut self.spare[i]);
             let of = (&self.scene, &self.scene.system[i]);
-            loaded.push(Loaded::new(particles, of, (i as u16, origin), self.ranges[i])?);
+            loaded.push(Loaded::new((particles, spare), of, (i as u16, origin), self.ranges[i])?);
         }
         Ok((loaded, origin))
     }
 
     /// Reads the frame of every visible system; `None` for hidden ones.
-    fn read(&mut self, frame: usize, watch: &dyn Watch) -> Result<Vec<Option<Arc<Particles>>>> {
+    fn read(
+        &mut self,
+        frame: usize,
+        after: After,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Option<Arc<Particles>>>> {
         let report = |done, total| _ = watch.progress("read", done, total);
         let mut all = Vec::new();
         for i in 0..self.series.len() {
@@ -277,7 +317,11 @@ impl Session {
             if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
                 self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
             }
-            all.push(Some(self.series[i].frame(own, &wanted, &report)?));
+            let series = &mut self.series[i];
+            all.push(Some(match after {
+                After::Kept => series.frame(own, &wanted, &report)?,
+                After::LetGo => Arc::new(series.take(own, &wanted, &report)?),
+            }));
         }
         Ok(all)
     }
@@ -455,7 +499,6 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("read", sum(&|l| l.particles.len()));
     stats.particles.insert("visible", sum(&|l| l.count_visible()));
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
-    stats.bytes.insert("input", sum(&|l| l.particles.bytes()));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
     stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));

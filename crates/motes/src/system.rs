@@ -1,12 +1,13 @@
 //! One particle system of one frame: its grids, what is visible of them, and its colours.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
-use motes_particles::expression::{Selection, select};
+use motes_particles::expression::{Property, Selection, select};
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, Scene, System};
+use motes_scene::{Bounds, ColorBy, Scene, System};
 
 use crate::annotate::box_shown;
 use crate::paint::{Paint, find_property};
@@ -26,12 +27,14 @@ pub(crate) struct Loaded {
 }
 
 impl Loaded {
-    /// Builds the grids of `particles` about the scene's `origin`, and what is visible of them.
+    /// Builds the grids of `particles` about the scene's `origin`, and what is visible of them. Of
+    /// particles that nobody else holds the positions are let go once the grids hold them. They are built in the
+    /// memory of `spare`, such as those of the last frame.
     ///
     /// # Errors
     /// A filter or colour names a property that is not there; an expression makes no sense.
     pub fn new(
-        particles: Arc<Particles>,
+        (mut particles, spare): (Arc<Particles>, RadiusClasses),
         (scene, system): (&Scene, &System),
         (number, origin): (u16, DVec3),
         range: Option<[f64; 2]>,
@@ -43,14 +46,19 @@ impl Loaded {
         };
         let scale = system.radius_scale as f32;
         let shift = DVec3::from_array(particles.origin) - origin;
-        let mut classes = if shift == DVec3::ZERO {
-            radius::classes(&particles.positions, rule, scale, params)
-        } else {
-            let about = |p: &[f32; 3]| (Vec3::from_array(*p).as_dvec3() + shift).as_vec3();
-            let positions: Vec<[f32; 3]> =
-                particles.positions.iter().map(|p| about(p).to_array()).collect();
-            radius::classes(&positions, rule, scale, params)
+        let keeps = asks_for_positions(&particles, system);
+        let own = Arc::get_mut(&mut particles).filter(|_| !keeps);
+        let mut positions = match own.map(Particles::take_positions) {
+            Some(positions) => Cow::Owned(positions),
+            None => Cow::Borrowed(&particles.positions[..]),
         };
+        if shift != DVec3::ZERO {
+            let about = |p: &mut [f32; 3]| {
+                *p = (Vec3::from_array(*p).as_dvec3() + shift).as_vec3().to_array();
+            };
+            positions.to_mut().iter_mut().for_each(about);
+        }
+        let mut classes = radius::classes(spare, positions, rule, scale, params);
         let paint = Paint::new(&particles, system, range)?;
         if !paint.opacity.is_opaque() {
             // What is translucent hides nothing that coincides with it.
@@ -131,6 +139,19 @@ pub(crate) fn visibility(
         Visibility::where_all(grid, &filters, keep)
     };
     Ok(classes.grids.iter().map(of_grid).collect())
+}
+
+/// Whether colours or what is visible go by the particles' positions.
+fn asks_for_positions(particles: &Particles, system: &System) -> bool {
+    let by_position =
+        |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
+    let color = match &system.color.by {
+        ColorBy::Property(name) => by_position(name),
+        _ => false,
+    };
+    color
+        || !system.r#where.trim().is_empty()
+        || system.filter.iter().any(|filter| by_position(&filter.property))
 }
 
 /// The box around the visible spheres of a block.

@@ -17,7 +17,8 @@ pub enum Radius {
 /// One frame: positions, radii, columns, box, time.
 ///
 /// # Invariants
-/// Every column, and `Radius::Each`, has as many rows as there are positions. Position `i` is
+/// Every column, and `Radius::Each`, has as many rows as there are particles, and there are as many
+/// positions, or none once they were taken. Position `i` is
 /// `origin + positions[i]` in the file's own coordinates. Positions need not be finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
@@ -25,6 +26,8 @@ pub struct Particles {
     pub origin: [f64; 3],
     /// Positions about `origin`.
     pub positions: Vec<[f32; 3]>,
+    /// How many positions were taken away by [`Particles::take_positions`]; else 0.
+    pub taken: usize,
     /// Radii.
     pub radius: Radius,
     /// All other properties, in the file's order.
@@ -40,12 +43,18 @@ pub struct Particles {
 impl Particles {
     /// How many particles there are.
     pub fn len(&self) -> usize {
-        self.positions.len()
+        self.positions.len() + self.taken
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.positions.is_empty()
+        self.len() == 0
+    }
+
+    /// Takes the positions away, for who keeps them in another order. All else stays as it is.
+    pub fn take_positions(&mut self) -> Vec<[f32; 3]> {
+        self.taken += self.positions.len();
+        std::mem::take(&mut self.positions)
     }
 
     /// The column called `name`, exactly.

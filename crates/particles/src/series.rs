@@ -124,6 +124,19 @@ impl Series {
         Ok(particles)
     }
 
+    /// As [`Series::frame`], for who asks for a frame once: it is not kept here.
+    ///
+    /// # Errors
+    /// As [`Series::frame`].
+    pub fn take(
+        &mut self,
+        frame: usize,
+        wanted: &Wanted,
+        progress: Progress<'_>,
+    ) -> Result<Particles> {
+        self.shared.run(|core| core.take(frame, wanted, progress))
+    }
+
     /// What was odd but could be read, so far: an incomplete last frame, a count that does not agree.
     pub fn warnings(&self) -> Vec<String> {
         lock(&self.shared.warnings).clone()
@@ -260,6 +273,20 @@ impl Core {
         let cached = Cached { frame, wanted: wanted.clone(), particles: particles.clone() };
         self.cache.push_back(cached);
         Ok(particles)
+    }
+
+    /// Reads a frame that is not kept.
+    fn take(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
+        let cached = self.cache.iter().position(|c| c.frame == frame);
+        match cached.and_then(|at| self.cache.remove(at)) {
+            Some(cached) if covers(&cached.wanted, wanted) => {
+                Ok(Arc::unwrap_or_clone(cached.particles))
+            }
+            _ => {
+                self.make_room();
+                self.files.read(frame, wanted, progress)
+            }
+        }
     }
 
     /// Before another frame as large as the latest: only that one is sure to stay.

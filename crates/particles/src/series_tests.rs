@@ -235,3 +235,20 @@ fn a_reader_that_is_no_file_is_a_series_too() {
     assert_eq!(series.frames(&|_, _| {}), Ok(3));
     assert_eq!(series.warnings(), ["the last frame is incomplete"]);
 }
+
+#[test]
+fn a_frame_that_is_taken_is_not_kept() {
+    let (mut series, seen) = series(&[3], None);
+    let mut particles = series.take(1, &Wanted::All, &|_, _| {}).unwrap();
+    assert_eq!((particles.len(), seen.read.load(SeqCst)), (1, 1));
+    // What is kept already is not read again, nor lost to who holds it.
+    let held = series.frame(1, &Wanted::All, &|_, _| {}).unwrap();
+    assert_eq!(series.take(1, &Wanted::All, &|_, _| {}).unwrap(), *held);
+    assert_eq!(seen.read.load(SeqCst), 2);
+    series.take(1, &Wanted::All, &|_, _| {}).unwrap();
+    assert_eq!(seen.read.load(SeqCst), 3);
+
+    assert_eq!(particles.take_positions(), held.positions);
+    assert_eq!((particles.len(), particles.positions.len()), (1, 0));
+    assert_eq!(particles.columns, held.columns);
+}

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use motes_grid::RadiusClasses;
 use motes_particles::Particles;
 use motes_scene::{CameraView, Framing, Lights, Primary, RelativeTo, Scene};
 use motes_spheres::{Counts, Spheres};
@@ -146,7 +147,7 @@ impl Bench {
         let total = stages.len() as u64 + 1;
         watch.progress("build", 0, total);
         // The first of this process: nothing is warm yet.
-        let (first_build, mut loaded) = self.build()?;
+        let (first_build, mut loaded) = self.build(RadiusClasses::default())?;
         let poses = self.poses(&loaded)?;
         let (first_frame, counts) = timed(|| self.draw(&loaded, &poses[0], (0, 0)));
         self.line.hash = self.studio.hash();
@@ -158,9 +159,7 @@ impl Bench {
                 "build" => {
                     let mut times = Vec::new();
                     for _ in 0..self.frames {
-                        // One at a time: two might not fit, and warm memory comes from the one before.
-                        drop(loaded);
-                        let built = self.build()?;
+                        let built = self.build(loaded.classes)?;
                         times.push(built.0);
                         loaded = built.1;
                     }
@@ -177,7 +176,7 @@ impl Bench {
     }
 
     /// Builds the grids from the unsorted arrays, and tells how long that took.
-    fn build(&self) -> Result<(f64, Loaded)> {
+    fn build(&self, spare: RadiusClasses) -> Result<(f64, Loaded)> {
         let system = &self.scene.system[0];
         let particles = &self.particles;
         let params = motes_grid::Params {
@@ -187,7 +186,10 @@ impl Bench {
         let rule = radius::rule(particles, system);
         let scale = system.radius_scale as f32;
         let (ms, built) = timed(|| {
-            let classes = radius::classes(&particles.positions, rule, scale, params);
+            let classes = {
+                let positions = particles.positions[..].into();
+                radius::classes(spare, positions, rule, scale, params)
+            };
             let visible = visibility(particles, &classes, system)?;
             Ok::<_, Error>((classes, visible))
         });

@@ -244,7 +244,11 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
     for (i, shot) in shots.iter().enumerate() {
         meter.picture(i, shots.len());
         let start = Instant::now();
-        let picture = session.render(*shot, plan.files.layers_wanted(), &meter)?;
+        let layers = plan.files.layers_wanted();
+        let picture = match shots.len() {
+            1 => session.render_once(*shot, layers, &meter)?,
+            _ => session.render(*shot, layers, &meter)?,
+        };
         // One picture for each frame has its number; else they are counted.
         let number = if shots.len() == last - first + 1 { shot.frame } else { i };
         let written = plan.files.write(&picture, number)?;

@@ -86,8 +86,11 @@ impl Source {
 
     /// The value of particle `row`.
     pub fn value(self, particles: &Particles, row: usize) -> f64 {
-        let coordinate =
-            |axis: usize| particles.origin[axis] + f64::from(particles.positions[row][axis]);
+        let coordinate = |axis: usize| match particles.positions.get(row) {
+            Some(position) => particles.origin[axis] + f64::from(position[axis]),
+            // It was taken away.
+            None => f64::NAN,
+        };
         match self {
             Self::Column { index, component: Some(c) } => particles.columns[index].number(row, c),
             Self::Column { index, component: None } => particles.columns[index].magnitude(row),

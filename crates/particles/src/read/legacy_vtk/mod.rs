@@ -286,7 +286,8 @@ impl<'a> DataSet<'a> {
         }
         let (radius, columns, warnings) = self.columns.finish(positions.len());
         let (time, step) = (self.time, self.step);
-        let particles = Particles { origin, positions, radius, columns, time, step, sim_box: None };
+        let particles =
+            Particles { origin, positions, radius, columns, time, step, ..Particles::default() };
         Ok((particles, warnings))
     }
 
