@@ -37,11 +37,7 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
         .map(|column| per_type(column, |name| system.radii.get(name).map(|r| *r as f32)));
     let rest = match &particles.radius {
         Radius::Uniform(r) => Rule::Uniform(*r),
-        Radius::Each(radii) => match &radii[..] {
-            // A file may say the same of each.
-            [first, rest @ ..] if rest.iter().all(|r| r == first) => Rule::Uniform(*first),
-            _ => Rule::Each(radii.clone()),
-        },
+        Radius::Each(radii) => Rule::Each(radii.clone()),
         Radius::Unknown => types.and_then(of_elements).map_or(Rule::HalfSpacing, Rule::Each),
     };
     let Some(given) = given else { return rest };

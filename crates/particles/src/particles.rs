@@ -14,6 +14,19 @@ pub enum Radius {
     Each(Vec<f32>),
 }
 
+impl Radius {
+    /// The same, without a list of equal radii.
+    pub fn simplified(self) -> Self {
+        match &self {
+            Self::Each(radii) => match &radii[..] {
+                [first, rest @ ..] if rest.iter().all(|r| r == first) => Self::Uniform(*first),
+                _ => self,
+            },
+            _ => self,
+        }
+    }
+}
+
 /// One frame: positions, radii, columns, box, time.
 ///
 /// # Invariants

@@ -339,7 +339,9 @@ impl Files {
         }
         let result = self.reader(file)?.read(within, wanted, progress);
         self.note_warnings(file);
-        result
+        let mut particles = result?;
+        particles.radius = std::mem::take(&mut particles.radius).simplified();
+        Ok(particles)
     }
 
     /// The file of a frame and the frame's number in it. Counts the files before it and no more.

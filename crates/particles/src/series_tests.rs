@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
 use super::*;
+use crate::Radius;
 
 /// What a fake file did, seen from outside.
 #[derive(Default)]
@@ -251,4 +252,13 @@ fn a_frame_that_is_taken_is_not_kept() {
     assert_eq!(particles.take_positions(), held.positions);
     assert_eq!((particles.len(), particles.positions.len()), (1, 0));
     assert_eq!(particles.columns, held.columns);
+}
+
+#[test]
+fn equal_radii_are_one_radius() {
+    let simplified = |radii: &[f32]| Radius::Each(radii.to_vec()).simplified();
+    assert_eq!(simplified(&[0.5, 0.5, 0.5]), Radius::Uniform(0.5));
+    assert_eq!(simplified(&[0.5, 0.5, 0.25]), Radius::Each(vec![0.5, 0.5, 0.25]));
+    assert_eq!(simplified(&[]), Radius::Each(vec![]));
+    assert_eq!(Radius::Unknown.simplified(), Radius::Unknown);
 }
