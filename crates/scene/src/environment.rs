@@ -250,8 +250,7 @@ mod tests {
     fn images_are_looked_up_by_direction() {
         // Azimuths −135°, −45°, 45°, 135° from straight ahead; upper and lower half.
         let pixels = (0..8).map(|i| [i as f32, 0.0, 0.0]).collect();
-        let image =
-            Equirectangular { width: 4, height: 2, pixels, up: Vec3::Z, ahead: Vec3::X };
+        let image = Equirectangular { width: 4, height: 2, pixels, up: Vec3::Z, ahead: Vec3::X };
         let at = |x: f32, y: f32, z: f32| image.light(Vec3::new(x, y, z).normalize()).x;
         // To the right of straight ahead (−y) columns go up.
         assert!((at(1.0, -1.0, 1e-3) - at(1.0, 1.0, 1e-3) - 1.0).abs() < 1e-2);

@@ -8,6 +8,9 @@
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
 //! threads or the size of tiles.
 
+pub mod connect;
+pub mod filter;
+pub mod normals;
 mod params;
 pub mod reference;
 mod spans;

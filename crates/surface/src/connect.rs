@@ -1,0 +1,173 @@
+//! Connect: which ends of spans in neighbouring columns belong to the same surface.
+//!
+//! Zirr & Dachsbacher 2015, §3.3 and Listing 1. A span is connected to those of a neighbouring column that
+//! it overlaps in depth: its entry to the entry of the frontmost, its exit to the exit of the backmost.
+//! Where that neighbour overlaps the preceding (following) span of the own column, too, both are walls of a
+//! bubble, and the entry (exit) is linked to the preceding exit (following entry). Without a neighbour entry
+//! and exit are linked to each other: the surface bends back there.
+//!
+//! A link is a byte, the four of a surface one word: the place of the linked surface in the neighbour's
+//! list, [`PRECEDING`] or [`FOLLOWING`] in the own one. Beyond the edge of the picture a surface goes on as it is: it is
+//! linked to itself.
+
+use rayon::prelude::*;
+
+use crate::Spans;
+
+/// The way to a neighbouring column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// One pixel to the left.
+    Left = 0,
+    /// One pixel to the right.
+    Right = 1,
+    /// One pixel up.
+    Up = 2,
+    /// One pixel down.
+    Down = 3,
+}
+
+/// The links of a surface, one for each [`Side`].
+pub type Links = [u8; 4];
+
+/// Link to the surface before in the own column.
+pub const PRECEDING: u8 = 254;
+/// Link to the surface behind in the own column.
+pub const FOLLOWING: u8 = 255;
+/// Most spans of a column that links can tell apart.
+pub const MOST_SPANS: u32 = 126;
+
+impl Side {
+    /// All four, in the order of [`Links`].
+    pub const ALL: [Self; 4] = [Self::Left, Self::Right, Self::Up, Self::Down];
+
+    /// The neighbour of the pixel (x, y) in a picture of `size`; none beyond its edge.
+    pub fn neighbor(self, [x, y]: [usize; 2], size: [usize; 2]) -> Option<[usize; 2]> {
+        match self {
+            Self::Left => (x > 0).then(|| [x - 1, y]),
+            Self::Right => (x + 1 < size[0]).then_some([x + 1, y]),
+            Self::Up => (y > 0).then(|| [x, y - 1]),
+            Self::Down => (y + 1 < size[1]).then_some([x, y + 1]),
+        }
+    }
+}
+
+/// The links of every surface of `spans`, parallel to its depths. Columns hold at most [`MOST_SPANS`] spans.
+pub fn connect(spans: &Spans) -> Vec<Links> {
+    let size = [spans.size.0 as usize, spans.size.1 as usize];
+    let mut links = vec![Links::default(); spans.depths.len()];
+    rows_mut(&mut links, spans).into_par_iter().enumerate().for_each(|(y, row)| {
+        let first = 2 * spans.starts[y * size[0]] as usize;
+        for x in 0..size[0] {
+            let own = column(spans, y * size[0] + x);
+            let from = 2 * spans.starts[y * size[0] + x] as usize - first;
+            let links = &mut row[from..from + own.len()];
+            for side in Side::ALL {
+                match side.neighbor([x, y], size) {
+                    Some([nx, ny]) => {
+                        connect_columns(own, column(spans, ny * size[0] + nx), (links, side));
+                    }
+                    None => itself(links, side),
+                }
+            }
+        }
+    });
+    links
+}
+
+/// A part of a list of values, one for each surface, for each row of the picture.
+pub(crate) fn rows_mut<'a, T>(mut values: &'a mut [T], spans: &Spans) -> Vec<&'a mut [T]> {
+    let width = spans.size.0 as usize;
+    let mut rows = Vec::with_capacity(spans.size.1 as usize);
+    for y in 0..spans.size.1 as usize {
+        let count = 2 * (spans.starts[(y + 1) * width] - spans.starts[y * width]) as usize;
+        let (row, rest) = values.split_at_mut(count);
+        rows.push(row);
+        values = rest;
+    }
+    rows
+}
+
+fn column(spans: &Spans, pixel: usize) -> &[f32] {
+    let of = spans.of(pixel);
+    &spans.depths[2 * of.start..2 * of.end]
+}
+
+fn itself(links: &mut [Links], side: Side) {
+    links.iter_mut().enumerate().for_each(|(place, links)| links[side as usize] = place as u8);
+}
+
+/// Listing 1 for each span of `own`, towards the column `next`.
+fn connect_columns(own: &[f32], next: &[f32], (links, side): (&mut [Links], Side)) {
+    let side = side as usize;
+    // Both columns go front to back, so neither list is ever gone back in.
+    let mut front = 0;
+    for s in 0..own.len() / 2 {
+        let (entry, exit) = (own[2 * s], own[2 * s + 1]);
+        while front < next.len() && next[front + 1] < entry {
+            front += 2;
+        }
+        if front >= next.len() || next[front] > exit {
+            links[2 * s][side] = FOLLOWING;
+            links[2 * s + 1][side] = PRECEDING;
+            continue;
+        }
+        let preceding_reaches = s > 0 && next[front] <= own[2 * s - 1];
+        links[2 * s][side] = if preceding_reaches { PRECEDING } else { front as u8 };
+        let mut back = front;
+        while back + 2 < next.len() && next[back + 2] <= exit {
+            back += 2;
+        }
+        let following_reaches = 2 * s + 2 < own.len() && own[2 * s + 2] <= next[back + 1];
+        links[2 * s + 1][side] = if following_reaches { FOLLOWING } else { back as u8 + 1 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The links towards `next` of the two ends of each span of `own`.
+    fn links(own: &[f32], next: &[f32]) -> Vec<u8> {
+        let mut links = vec![Links::default(); own.len()];
+        connect_columns(own, next, (&mut links, Side::Right));
+        links.iter().map(|l| l[1]).collect()
+    }
+
+    #[test]
+    fn overlapping_spans_go_on() {
+        assert_eq!(links(&[1.0, 2.0, 4.0, 5.0], &[1.5, 2.5, 4.5, 6.0]), [0, 1, 2, 3]);
+        // Of several the frontmost and the backmost.
+        assert_eq!(links(&[1.0, 9.0], &[0.0, 0.5, 2.0, 3.0, 5.0, 6.0, 11.0, 12.0]), [2, 5]);
+    }
+
+    #[test]
+    fn walls_of_a_bubble_are_linked_to_each_other() {
+        assert_eq!(links(&[1.0, 4.0, 5.0, 9.0], &[2.0, 8.0]), [0, FOLLOWING, PRECEDING, 1]);
+    }
+
+    #[test]
+    fn without_a_neighbour_the_surface_bends_back() {
+        let alone = [FOLLOWING, PRECEDING];
+        assert_eq!(links(&[1.0, 2.0], &[]), alone);
+        assert_eq!(links(&[1.0, 2.0], &[3.0, 4.0]), alone);
+        assert_eq!(links(&[3.0, 4.0], &[1.0, 2.0]), alone);
+        assert_eq!(links(&[3.0, 4.0, 6.0, 7.0], &[6.5, 9.0]), [FOLLOWING, PRECEDING, 0, 1]);
+    }
+
+    #[test]
+    fn every_side_has_its_links() {
+        // Three columns beside each other, one below the middle.
+        let mut spans = Spans { size: (3, 2), ..Spans::default() };
+        spans.starts = vec![0, 1, 3, 4, 4, 5, 5];
+        spans.depths = vec![1.0, 2.0, 1.0, 2.0, 3.0, 4.0, 3.5, 5.0, 0.0, 6.0];
+        let links = connect(&spans);
+        assert_eq!(links[0], [0, 0, 0, FOLLOWING]);
+        assert_eq!(links[2], [0, FOLLOWING, 0, 0]);
+        assert_eq!(links[3], [1, PRECEDING, 1, FOLLOWING]);
+        assert_eq!(links[4], [FOLLOWING, 0, 2, PRECEDING]);
+        assert_eq!(links[5], [PRECEDING, 1, 3, 1]);
+        assert_eq!(links[8], [FOLLOWING, FOLLOWING, 0, 0]);
+        assert_eq!(links[9], [PRECEDING, PRECEDING, 3, 1]);
+    }
+}
