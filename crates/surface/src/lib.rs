@@ -8,14 +8,26 @@
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
 //! threads or the size of tiles.
 
+mod blocks;
 pub mod connect;
 pub mod filter;
+pub mod march;
 pub mod normals;
+mod occlusion;
 mod params;
 pub mod reference;
+mod refract;
+mod shade;
+mod shadow;
 mod spans;
+mod surfaces;
 mod view;
 
+pub use blocks::Blocks;
+pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
+pub use shade::{Around, Mode, Optics, Paint, shade};
+pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
+pub use surfaces::Surfaces;
 pub use view::View;

@@ -1,0 +1,143 @@
+//! Blocks: what columns that lie together have in common, so that rays skip them.
+//!
+//! Zirr & Dachsbacher 2015, §6: "ray casting can be accelerated using a hierarchical representation of the
+//! spans akin to mipmapping". A block is a square of [`EDGE`]² columns. Where, at one depth, all its columns
+//! are inside the liquid, or all outside, so is every ray that passes there; the depths between are its
+//! *bands*. A ray that passes no band meets nothing in the block.
+
+use rayon::prelude::*;
+
+use crate::Surfaces;
+
+/// Columns along a block's edge.
+pub const EDGE: usize = 8;
+/// Most bands of a block: of more, those with the least between them become one.
+const BANDS: usize = 6;
+
+/// Depths, as nearness, at which the columns of a block differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Band {
+    near: f32,
+    far: f32,
+    /// Whether behind it all columns are inside.
+    inside: bool,
+}
+
+/// The bands of one block, near ones first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    bands: [Band; BANDS],
+    count: usize,
+}
+
+/// The blocks of a picture.
+#[derive(Clone, Debug)]
+pub struct Blocks {
+    blocks: Vec<Block>,
+    across: usize,
+}
+
+impl Blocks {
+    /// The blocks of all columns.
+    pub fn new(surfaces: &Surfaces) -> Self {
+        let [width, height] = [surfaces.view.size.0 as usize, surfaces.view.size.1 as usize];
+        let across = width.div_ceil(EDGE);
+        let block = |(events, i): (&mut Vec<Event>, usize)| {
+            let [x, y] = [i % across * EDGE, i / across * EDGE];
+            let columns = || {
+                let xs = x..(x + EDGE).min(width);
+                (y..(y + EDGE).min(height))
+                    .flat_map(move |y| xs.clone().map(move |x| y * width + x))
+            };
+            Block::new(surfaces, columns, events)
+        };
+        let blocks = (0..across * height.div_ceil(EDGE))
+            .into_par_iter()
+            .with_min_len(across)
+            .map_init(Vec::new, |events, i| block((events, i)))
+            .collect();
+        Self { blocks, across }
+    }
+
+    /// Whether a ray that is `inside` or not meets nothing in the block at (x, y), in blocks, between two
+    /// values of nearness.
+    #[inline]
+    pub(crate) fn skips(&self, [x, y]: [usize; 2], [from, to]: [f32; 2], inside: bool) -> bool {
+        let block = &self.blocks[y * self.across + x];
+        let (near, far) = (from.max(to), from.min(to));
+        let bands = &block.bands[..block.count];
+        // Bands before the ray, and none within it.
+        let before = bands.iter().take_while(|b| b.far > near).count();
+        let meets = bands.get(before).is_some_and(|b| b.near >= far);
+        let state = before > 0 && bands[before - 1].inside;
+        !meets && state == inside
+    }
+}
+
+/// An end of a span in some column of a block.
+#[derive(Clone, Copy)]
+struct Event {
+    nearness: f32,
+    enters: bool,
+}
+
+impl Block {
+    fn new<C: Iterator<Item = usize>>(
+        surfaces: &Surfaces,
+        columns: impl Fn() -> C,
+        events: &mut Vec<Event>,
+    ) -> Self {
+        events.clear();
+        let mut all = 0;
+        for column in columns() {
+            all += 1;
+            events.extend(
+                surfaces
+                    .of(column)
+                    .map(|s| Event { nearness: surfaces.nearness[s], enters: s % 2 == 0 }),
+            );
+        }
+        events.sort_unstable_by(|a, b| b.nearness.total_cmp(&a.nearness));
+        let mut block = Self::default();
+        let mut open: Option<f32> = None;
+        let mut inside = 0_usize;
+        for (i, event) in events.iter().enumerate() {
+            let near = *open.get_or_insert(event.nearness);
+            // Where a filter let two ends of a column change places, what is odd stays in the band.
+            inside = if event.enters { inside + 1 } else { inside.wrapping_sub(1) };
+            let alike = inside == 0 || inside == all;
+            let last = events.get(i + 1).is_none_or(|next| next.nearness < event.nearness);
+            if alike && last {
+                block.push(Band { near, far: event.nearness, inside: inside == all });
+                open = None;
+            }
+        }
+        block
+    }
+
+    fn push(&mut self, band: Band) {
+        if self.count < BANDS {
+            self.bands[self.count] = band;
+            self.count += 1;
+            return;
+        }
+        let gap = |i: usize| {
+            let next = if i + 1 < BANDS { self.bands[i + 1] } else { band };
+            self.bands[i].far - next.near
+        };
+        let mut least = 0;
+        for i in 1..BANDS {
+            if gap(i) < gap(least) {
+                least = i;
+            }
+        }
+        if least + 1 < BANDS {
+            let next = self.bands[least + 1];
+            self.bands[least] = Band { near: self.bands[least].near, ..next };
+            self.bands.copy_within(least + 2.., least + 1);
+            self.bands[BANDS - 1] = band;
+        } else {
+            self.bands[least] = Band { near: self.bands[least].near, ..band };
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! March: what a ray meets, column by column.
+//!
+//! Zirr & Dachsbacher 2015, §3.5, Fig. 4 and Listing 2. A line in the world is a line in the picture, and
+//! along it nearness (see [`crate::filter::nearness`]) is linear, too, so that in a column the ray passes
+//! the surfaces whose nearness lies between its own where it enters and where it leaves. Where it is on
+//! another side of the surface when it enters a column than it was before, it went through the wall between
+//! the columns.
+//!
+//! Columns are steps where the surface is smooth. A ray that leaves a surface, or goes along it, would hit
+//! the next step; so what is met must be met from the right side of its normal, or it is passed over.
+
+use glam::Vec3;
+use motes_scene::Projection;
+
+use crate::Surfaces;
+use crate::blocks::{Blocks, EDGE};
+
+/// A ray, where it starts from and whether that is in the liquid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Whether it starts inside the liquid.
+    pub inside: bool,
+    /// The surface it starts from, which it does not meet again.
+    pub from: Option<usize>,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The point.
+    pub point: Vec3,
+    /// The surface.
+    pub surface: usize,
+    /// Its unit normal, towards where the ray comes from.
+    pub normal: Vec3,
+    /// Distance from the ray's start.
+    pub distance: f32,
+}
+
+/// A ray as a line over the picture: place and nearness at its start and their change to its end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    start: [f32; 3],
+    change: [f32; 3],
+}
+
+/// Lines shorter than this many pixels stay in their column.
+const SHORT: f32 = 1e-4;
+
+impl Line {
+    /// The part of `ray` between the near and the far plane.
+    fn new(surfaces: &Surfaces, ray: &Ray) -> Option<Self> {
+        let view = &surfaces.view;
+        let rays = &view.rays;
+        let scale = 1.0 / rays.pixel;
+        let from = ray.origin - rays.origin;
+        let along = |v: Vec3| {
+            Vec3::new(v.dot(rays.right) * scale, -v.dot(rays.up) * scale, v.dot(rays.forward))
+        };
+        let (p, d) = (along(from), along(ray.direction));
+        // The near plane may be touched by what was clipped there.
+        let reach = if d.z > 0.0 { (view.far - p.z) / d.z } else { (view.near - p.z) / d.z };
+        let whole = 2.0 * (view.far + from.length());
+        let reach = if d.z == 0.0 { whole } else { reach.min(whole) };
+        let on_picture = |v: Vec3| match rays.projection {
+            Projection::Perspective => {
+                let q = 1.0 / v.z;
+                [rays.center[0] + v.x * q, rays.center[1] + v.y * q, q]
+            }
+            Projection::Orthographic => [rays.center[0] + v.x, rays.center[1] + v.y, -v.z],
+        };
+        if reach.is_nan() || reach <= 0.0 {
+            return None;
+        }
+        let (start, end) = (on_picture(p), on_picture(p + d * reach));
+        let finite = start.iter().chain(&end).all(|x| x.is_finite());
+        finite.then(|| Self { start, change: [0, 1, 2].map(|i| end[i] - start[i]) })
+    }
+
+    #[inline]
+    fn at(&self, u: f32) -> [f32; 3] {
+        [0, 1, 2].map(|i| self.start[i] + self.change[i] * u)
+    }
+
+    /// Where along the line it comes to `place` of an axis of the picture.
+    #[inline]
+    fn reaches(&self, axis: usize, place: f32) -> f32 {
+        if self.change[axis].abs() < SHORT {
+            return f32::INFINITY;
+        }
+        (place - self.start[axis]) / self.change[axis]
+    }
+}
+
+/// The first surface that `ray` meets, and the number of columns it went through.
+pub fn march(surfaces: &Surfaces, ray: &Ray) -> (Option<Hit>, u32) {
+    march_over(surfaces, ray, None)
+}
+
+/// As [`march`], with the same result, over the columns that cannot be skipped.
+pub fn march_blocks((surfaces, blocks): (&Surfaces, &Blocks), ray: &Ray) -> (Option<Hit>, u32) {
+    march_over(surfaces, ray, Some(blocks))
+}
+
+fn march_over(surfaces: &Surfaces, ray: &Ray, blocks: Option<&Blocks>) -> (Option<Hit>, u32) {
+    let Some(line) = Line::new(surfaces, ray) else { return (None, 0) };
+    let size = [surfaces.view.size.0 as i32, surfaces.view.size.1 as i32];
+    let at = [line.start[0].floor() as i32, line.start[1].floor() as i32];
+    // A start on the wall between two columns may be rounded to the other one.
+    let mut pixel = [0, 1].map(|i| at[i].clamp(0, size[i] - 1));
+    let step = [0, 1].map(|i| if line.change[i] > 0.0 { 1 } else { -1 });
+    let mut walk = Walk { surfaces, ray, line, before: None };
+    let (mut u, mut columns, mut tried) = (0.0_f32, 0, None);
+    loop {
+        if let Some(blocks) = blocks.filter(|_| columns > 0) {
+            let block = pixel.map(|p| p / EDGE as i32);
+            if tried != Some(block) {
+                tried = Some(block);
+                match line.skip((blocks, ray.inside), (pixel, u), size) {
+                    Skip::Not => {}
+                    Skip::Out => return (None, columns),
+                    Skip::To { last, next, at } => {
+                        walk.before = Some((last[1] * size[0] + last[0]) as usize);
+                        (pixel, u) = (next, at);
+                        continue;
+                    }
+                }
+            }
+        }
+        let next = [0, 1].map(|i| line.reaches(i, (pixel[i] + step[i].max(0)) as f32));
+        let axis = usize::from(next[1] < next[0]);
+        let end = next[axis].clamp(u, 1.0);
+        let column = (pixel[1] * size[0] + pixel[0]) as usize;
+        columns += 1;
+        if let Some(hit) = walk.column(column, [u, end], columns == 1) {
+            return (Some(hit), columns);
+        }
+        pixel[axis] += step[axis];
+        if next[axis] >= 1.0 || pixel[axis] < 0 || pixel[axis] >= size[axis] {
+            return (None, columns);
+        }
+        u = end;
+    }
+}
+
+/// Whether the rest of a block is skipped.
+enum Skip {
+    Not,
+    /// The line ends in it, or the picture behind it.
+    Out,
+    /// Up to `at`, where the line goes from the pixel `last` to `next`.
+    To {
+        last: [i32; 2],
+        next: [i32; 2],
+        at: f32,
+    },
+}
+
+impl Line {
+    /// Whether the line meets nothing between `u`, where it is in `pixel`, and the end of that block.
+    fn skip(
+        &self,
+        (blocks, inside): (&Blocks, bool),
+        (pixel, u): ([i32; 2], f32),
+        size: [i32; 2],
+    ) -> Skip {
+        let edge = EDGE as i32;
+        let block = pixel.map(|p| p / edge);
+        let step = [0, 1].map(|i| if self.change[i] > 0.0 { 1 } else { -1 });
+        let border = [0, 1].map(|i| (block[i] + step[i].max(0)) * edge);
+        let next = [0, 1].map(|i| self.reaches(i, border[i] as f32));
+        let axis = usize::from(next[1] < next[0]);
+        let at = next[axis].clamp(u, 1.0);
+        let range = [u, at].map(|u| self.start[2] + self.change[2] * u);
+        if !blocks.skips(block.map(|b| b as usize), range, inside) {
+            return Skip::Not;
+        }
+        // The pixel on the other axis is the one that a walk from column to column comes to.
+        let across = 1 - axis;
+        let mut last = pixel;
+        last[axis] = border[axis] - step[axis].max(0);
+        while last[across] != border[across] - step[across].max(0) {
+            let wall = self.reaches(across, (last[across] + step[across].max(0)) as f32);
+            // Of two walls at one place the first axis is crossed first.
+            let crossed = if across == 0 { wall <= next[axis] } else { wall < next[axis] };
+            if !crossed {
+                break;
+            }
+            last[across] += step[across];
+        }
+        let mut next_pixel = last;
+        next_pixel[axis] += step[axis];
+        if next[axis] >= 1.0 || next_pixel[axis] < 0 || next_pixel[axis] >= size[axis] {
+            return Skip::Out;
+        }
+        Skip::To { last, next: next_pixel, at }
+    }
+}
+
+struct Walk<'a> {
+    surfaces: &'a Surfaces,
+    ray: &'a Ray,
+    line: Line,
+    /// The last column.
+    before: Option<usize>,
+}
+
+impl Walk<'_> {
+    /// What is met in a column, between two places of the line.
+    #[inline]
+    fn column(&mut self, column: usize, [from, to]: [f32; 2], first: bool) -> Option<Hit> {
+        let of = self.surfaces.of(column);
+        let list = &self.surfaces.nearness[of.clone()];
+        let [q, end] = [from, to].map(|u| self.line.start[2] + self.line.change[2] * u);
+        // How many surfaces lie before the ray's place: inside, if they are odd.
+        let mut count = list.iter().take_while(|n| **n > q).count();
+        if let Some(own) = self.ray.from.filter(|own| first && of.contains(own)) {
+            // Of its own surface the ray is on the side that it goes to.
+            count = own - of.start + usize::from(end < q);
+        } else if !first && (count % 2 == 1) != self.ray.inside {
+            let hit = self.wall(of.start, (list, count), from);
+            if hit.is_some() {
+                return hit;
+            }
+        }
+        let away = end < q;
+        loop {
+            let next = if away { Some(count) } else { count.checked_sub(1) };
+            let Some(next) = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))
+            else {
+                break;
+            };
+            count = if away { count + 1 } else { count - 1 };
+            if (count % 2 == 1) != self.ray.inside {
+                let u = (list[next] - self.line.start[2]) / self.line.change[2];
+                let hit = self.hit(of.start + next, u);
+                if hit.is_some() {
+                    return hit;
+                }
+            }
+        }
+        self.before = Some(column);
+        None
+    }
+
+    /// The wall of a column that is met at `u`: with the normal of the nearest surface in this column or
+    /// the last.
+    fn wall(&self, first: usize, (list, count): (&[f32], usize), u: f32) -> Option<Hit> {
+        let q = self.line.start[2] + self.line.change[2] * u;
+        let here = nearest(list, count, q).map(|i| first + i);
+        let there = self.before.and_then(|column| {
+            let of = self.surfaces.of(column);
+            let list = &self.surfaces.nearness[of.clone()];
+            let count = list.iter().take_while(|n| **n > q).count();
+            nearest(list, count, q).map(|i| of.start + i)
+        });
+        here.into_iter().chain(there).find_map(|surface| self.hit(surface, u))
+    }
+
+    /// The surface met at `u`, if it is met from its right side.
+    fn hit(&self, surface: usize, u: f32) -> Option<Hit> {
+        let normal = self.surfaces.normal(surface);
+        let towards = if self.ray.inside { -normal } else { normal };
+        if self.ray.direction.dot(towards) >= 0.0 {
+            return None;
+        }
+        let [x, y, q] = self.line.at(u);
+        let point = self.surfaces.view.point([x, y], q);
+        let distance = point.distance(self.ray.origin);
+        Some(Hit { point, surface, normal: towards, distance })
+    }
+}
+
+#[inline]
+fn passes(surface: f32, end: f32, away: bool) -> bool {
+    if away { surface >= end } else { surface <= end }
+}
+
+/// The place in `list` of the surface nearest to `q`, before which there are `count`.
+#[inline]
+fn nearest(list: &[f32], count: usize, q: f32) -> Option<usize> {
+    let before = count.checked_sub(1);
+    let behind = Some(count).filter(|i| *i < list.len());
+    match (before, behind) {
+        (Some(a), Some(b)) => Some(if list[a] - q <= q - list[b] { a } else { b }),
+        (a, b) => a.or(b),
+    }
+}

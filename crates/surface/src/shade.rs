@@ -1,0 +1,205 @@
+//! Shade: pictures from surfaces.
+//!
+//! Zirr & Dachsbacher 2015, §3.5: *front* reads the first surface of each column; *translucent* goes over
+//! all spans of it and lets them absorb and scatter (their extended last ones, too, without what is empty in them);
+//! *refractive* follows the light, see `refract.rs`.
+
+use glam::{Vec3, Vec4};
+use motes_scene::{Beyond, Lights, optics};
+use rayon::prelude::*;
+
+use crate::occlusion::Occlusion;
+use crate::refract;
+use crate::shadow::Shadow;
+use crate::{Spans, Surfaces};
+
+/// How the liquid is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Its first surface, opaque.
+    Front,
+    /// Light goes straight through and is absorbed and scattered on the way.
+    Translucent,
+    /// Light is refracted and reflected.
+    Refractive,
+}
+
+/// What the liquid does to light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    /// How it is shown.
+    pub mode: Mode,
+    /// Index of refraction over that of what is around.
+    pub ior: f32,
+    /// What is taken from each colour per unit of length.
+    pub absorption: Vec3,
+    /// The part of light that is not absorbed but scattered, for each colour, per unit of length; in refractive
+    /// mode none is.
+    pub scattering: Vec3,
+    /// Boundaries that a path goes on from after the first.
+    pub depth: u32,
+    /// Whether rays skip what blocks of columns have in common.
+    pub skip: bool,
+}
+
+/// The colours of the liquid, from particles.
+pub trait Paint: Sync {
+    /// Linear colour of the particle, by its place in the input.
+    fn color(&self, particle: u32) -> Vec3;
+}
+
+/// What is around the liquid.
+#[derive(Clone, Copy)]
+pub struct Around<'a> {
+    /// The lights.
+    pub lights: &'a Lights,
+    /// What rays meet outside.
+    pub beyond: &'a dyn Beyond,
+    /// Whether rays that meet nothing show what is beyond; else the picture is transparent there.
+    pub shown: bool,
+    /// What keeps the key light away, if it casts shadows.
+    pub shadow: Option<&'a Shadow>,
+    /// What keeps fill light away.
+    pub occlusion: Option<&'a Occlusion>,
+    /// Colours of the liquid, if not one throughout.
+    pub paint: Option<&'a dyn Paint>,
+    /// The liquid's colour where it is shown opaque or scatters.
+    pub color: Vec3,
+}
+
+impl Around<'_> {
+    /// The colour of the liquid at a surface.
+    pub(crate) fn color_of(&self, surfaces: &Surfaces, surface: usize) -> Vec3 {
+        let particle = surfaces.particles.get(surface).filter(|p| **p != Spans::NO_PARTICLE);
+        match (self.paint, particle) {
+            (Some(paint), Some(particle)) => paint.color(*particle),
+            _ => self.color,
+        }
+    }
+
+    /// What comes from outside along a ray, in shadow where the liquid casts one.
+    pub(crate) fn meet(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)> {
+        let (light, distance) = self.beyond.meet(origin, direction, reach)?;
+        let lit = match self.shadow.filter(|_| distance.is_finite()) {
+            Some(shadow) => shadow.fill_and_key(origin + direction * distance),
+            None => Vec3::ONE,
+        };
+        Some((light * lit, distance))
+    }
+
+    /// The light from the surroundings, wherever they are.
+    pub(crate) fn background(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        self.meet(origin, direction, f32::INFINITY).map_or(Vec3::ZERO, |(light, _)| light)
+    }
+}
+
+/// The picture: linear, premultiplied colours, row by row.
+pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
+    let width = surfaces.view.size.0 as usize;
+    let blocks = (optics.mode == Mode::Refractive && optics.skip)
+        .then(|| crate::blocks::Blocks::new(surfaces));
+    let paths = refract::Paths { surfaces, optics, around, blocks: blocks.as_ref() };
+    let mut color = vec![[0.0; 4]; surfaces.view.pixels()];
+    color.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, color) in row.iter_mut().enumerate() {
+            let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
+            let pixel = Pixel { index: y * width + x, place: [x, y], origin, direction };
+            *color = match (surfaces.of(pixel.index).is_empty(), optics.mode) {
+                (true, _) => nothing(&pixel, around),
+                (_, Mode::Front) => front(surfaces, &pixel, around),
+                (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
+                (_, Mode::Refractive) => paths.pixel(&pixel),
+            }
+            .to_array();
+        }
+    });
+    color
+}
+
+/// A pixel and its ray.
+pub(crate) struct Pixel {
+    pub index: usize,
+    pub place: [usize; 2],
+    pub origin: Vec3,
+    pub direction: Vec3,
+}
+
+fn nothing(pixel: &Pixel, around: &Around<'_>) -> Vec4 {
+    match around.shown {
+        true => around.background(pixel.origin, pixel.direction).extend(1.0),
+        // The floor and other things are not the background.
+        false => Vec4::ZERO,
+    }
+}
+
+/// The light of a surface of colour `color`, as if it were opaque.
+fn lit(surfaces: &Surfaces, (pixel, surface): (&Pixel, usize), around: &Around<'_>) -> Vec3 {
+    let (normal, lights) = (surfaces.normal(surface), around.lights);
+    let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
+    let point = surfaces.view.point([x, y], surfaces.nearness[surface]);
+    let key = lights.key.seen_from(point);
+    let cos = normal.dot(key.direction).max(0.0);
+    let reached = match around.shadow {
+        Some(shadow) if cos > 0.0 => shadow.reached(point, normal),
+        _ => 1.0,
+    };
+    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, surface)));
+    lights.key.color * (cos * reached) + lights.fill(normal) * open + lights.ambient
+}
+
+/// What the first surface mirrors, and how much of it.
+fn mirrored(
+    surfaces: &Surfaces,
+    pixel: &Pixel,
+    (optics, around): (&Optics, &Around<'_>),
+) -> (Vec3, f32) {
+    let first = surfaces.of(pixel.index).start;
+    let normal = surfaces.normal(first);
+    let split = optics::split(pixel.direction, normal, 1.0 / optics.ior);
+    let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
+    let point = surfaces.view.point([x, y], surfaces.nearness[first]);
+    (around.background(point, split.reflected), split.reflectance)
+}
+
+fn front(surfaces: &Surfaces, pixel: &Pixel, around: &Around<'_>) -> Vec4 {
+    let first = surfaces.of(pixel.index).start;
+    let color = around.color_of(surfaces, first);
+    (color * lit(surfaces, (pixel, first), around)).extend(1.0)
+}
+
+fn translucent(
+    surfaces: &Surfaces,
+    pixel: &Pixel,
+    (optics, around): (&Optics, &Around<'_>),
+) -> Vec4 {
+    let of = surfaces.of(pixel.index);
+    let per_depth = 1.0 / pixel.direction.dot(surfaces.view.rays.forward);
+    let (mut light, mut left) = (Vec3::ZERO, Vec3::ONE);
+    let first = of.start;
+    let extinction = optics.absorption + optics.scattering;
+    for entry in of.clone().step_by(2) {
+        let mut length = surfaces.depth(entry + 1) - surfaces.depth(entry);
+        if entry + 2 == of.end {
+            length -= surfaces.empty(pixel.index);
+        }
+        let through = optics::transmitted(extinction, length.max(0.0) * per_depth);
+        let albedo = optics.scattering / extinction.max(Vec3::splat(f32::MIN_POSITIVE));
+        let color = around.color_of(surfaces, entry);
+        let scattered = albedo * color * lit(surfaces, (pixel, entry), around);
+        light += left * (Vec3::ONE - through) * scattered;
+        left *= through;
+    }
+    let (mirror, reflectance) = mirrored(surfaces, pixel, (optics, around));
+    // An eye inside sees no mirror.
+    let reflectance = if surfaces.depth(first) > surfaces.view.near { reflectance } else { 0.0 };
+    let mut color = light * (1.0 - reflectance) + mirror * reflectance;
+    let mut alpha = 1.0;
+    match around.shown {
+        true => {
+            let beyond = around.background(pixel.origin, pixel.direction);
+            color += left * (1.0 - reflectance) * beyond;
+        }
+        false => alpha = 1.0 - left.element_sum() / 3.0 * (1.0 - reflectance),
+    }
+    color.extend(alpha)
+}

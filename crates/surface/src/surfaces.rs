@@ -1,0 +1,96 @@
+//! Surfaces: what is known of the liquid once spans are connected, smoothed and have normals.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use motes_scene::Projection;
+
+use crate::connect::connect;
+use crate::filter::{self, Scale};
+use crate::normals::{normals, unpack};
+use crate::{Extended, Spans, View};
+
+/// The ends of all spans, smoothed, with normals: all that pictures are made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surfaces {
+    /// Where they are seen from.
+    pub view: View,
+    /// First span of each pixel, row by row, and the number of all at the end.
+    pub starts: Vec<u32>,
+    /// How near each surface is, see [`filter::nearness`]: falling in each column.
+    pub nearness: Vec<f32>,
+    /// Unit normals out of the liquid, see [`crate::normals::pack`].
+    pub normals: Vec<u32>,
+    /// Pixels that had more spans than are stored, in order.
+    pub extended: Vec<Extended>,
+    /// The particle of each surface, or empty; see [`Spans::particles`].
+    pub particles: Vec<u32>,
+}
+
+impl Surfaces {
+    /// Connects, smooths by the standard deviation `smoothing` (world units; 0: not at all) and finds the
+    /// normals of `spans`, which `view` shows.
+    pub fn new(spans: Spans, view: View, smoothing: f32) -> Self {
+        let links = connect(&spans);
+        let mut nearness = filter::nearness(&spans, view.rays.projection);
+        if smoothing > 0.0 {
+            filter::smooth(&mut nearness, (&spans, &links), &Scale::new(smoothing, &view));
+        }
+        let normals = normals(&nearness, (&spans, &links), &view);
+        let Spans { starts, extended, particles, .. } = spans;
+        Self { view, starts, nearness, normals, extended, particles }
+    }
+
+    /// The surfaces of a pixel.
+    #[inline]
+    pub fn of(&self, pixel: usize) -> Range<usize> {
+        2 * self.starts[pixel] as usize..2 * self.starts[pixel + 1] as usize
+    }
+
+    /// The depth of a surface, along the view's `forward`.
+    #[inline]
+    pub fn depth(&self, surface: usize) -> f32 {
+        filter::depth(self.nearness[surface], self.view.rays.projection)
+    }
+
+    /// The unit normal of a surface, out of the liquid.
+    #[inline]
+    pub fn normal(&self, surface: usize) -> Vec3 {
+        unpack(self.normals[surface])
+    }
+
+    /// What is empty inside the last stored span of a pixel, in depth.
+    pub fn empty(&self, pixel: usize) -> f32 {
+        let place = self.extended.binary_search_by_key(&(pixel as u32), |e| e.pixel);
+        place.map_or(0.0, |place| self.extended[place].empty)
+    }
+
+    /// Length inside the liquid, in depth, along the ray of a pixel.
+    pub fn thickness(&self, pixel: usize) -> f32 {
+        let of = self.of(pixel);
+        let spans = of.step_by(2).map(|entry| self.depth(entry + 1) - self.depth(entry));
+        spans.sum::<f32>() - self.empty(pixel)
+    }
+
+    /// Bytes of all parts.
+    pub fn bytes(&self) -> usize {
+        let words = self.starts.len() + 2 * self.nearness.len() + self.particles.len();
+        words * 4 + self.extended.len() * size_of::<Extended>()
+    }
+}
+
+impl View {
+    /// The point at a place of the picture and a nearness.
+    #[inline]
+    pub fn point(&self, [x, y]: [f32; 2], nearness: f32) -> Vec3 {
+        let rays = &self.rays;
+        let a = (x - rays.center[0]) * rays.pixel;
+        let b = (rays.center[1] - y) * rays.pixel;
+        let z = filter::depth(nearness, rays.projection);
+        let across = rays.right * a + rays.up * b;
+        match rays.projection {
+            Projection::Perspective => rays.origin + (rays.forward + across) * z,
+            Projection::Orthographic => rays.origin + across + rays.forward * z,
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Rays through the liquid: against the exact ball lens, and with blocks against without.
+
+use glam::{DVec3, Vec3};
+use motes_scene::{Beyond, Lights, Projection, Rays, Scene, optics};
+use motes_surface::march::{Ray, march, march_blocks};
+use motes_surface::reference::{Sphere, voxelize};
+use motes_surface::{Around, Blocks, Mode, Optics, Surfaces, View, shade};
+
+const WATER: f32 = 1.33;
+
+/// A sky that is different in every direction, and smooth.
+struct Hues;
+
+impl Hues {
+    fn light(direction: Vec3) -> Vec3 {
+        let of = |axis: Vec3| 0.5 + 0.4 * (3.0 * direction.dot(axis)).sin();
+        Vec3::new(of(Vec3::new(0.9, 0.3, 0.2)), of(Vec3::Y), of(Vec3::new(-0.3, 0.2, 0.9)))
+    }
+}
+
+impl Beyond for Hues {
+    fn meet(&self, _: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)> {
+        (reach == f32::INFINITY).then(|| (Self::light(direction), reach))
+    }
+}
+
+fn view(size: (u32, u32), projection: Projection) -> View {
+    let pixel = match projection {
+        Projection::Perspective => 0.7 / size.1 as f32,
+        Projection::Orthographic => 4.0 / size.1 as f32,
+    };
+    let rays = Rays {
+        origin: Vec3::new(0.0, 0.0, -5.0),
+        forward: Vec3::Z,
+        right: Vec3::X,
+        up: Vec3::Y,
+        center: [size.0 as f32 / 2.0, size.1 as f32 / 2.0],
+        pixel,
+        projection,
+    };
+    View { rays, size, near: 0.5, far: 12.0 }
+}
+
+fn lights() -> Lights {
+    Scene::default().resolve(None).map(|r| r.lights).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// What an eye sees of a clear ball: reflected, and refracted twice, each with the part that goes there.
+fn lens(origin: Vec3, direction: Vec3, radius: f32) -> Option<Vec3> {
+    let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
+    let b = o.dot(d);
+    let inside = b * b - o.length_squared() + f64::from(radius).powi(2);
+    let point = (o + d * (-b - (inside >= 0.0).then(|| inside.sqrt())?)).as_vec3();
+    let normal = point / radius;
+    let first = optics::split(direction, normal, 1.0 / WATER);
+    let through = first.refracted?;
+    let out = point + through * (-2.0 * point.dot(through));
+    let second = optics::split(through, -out / radius, WATER);
+    let refracted = Hues::light(second.refracted?);
+    let reflected = Hues::light(first.reflected);
+    Some(reflected * first.reflectance + refracted * (1.0 - first.reflectance))
+}
+
+#[test]
+fn a_ball_is_a_lens() {
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        let view = view((320, 240), projection);
+        let ball = [Sphere { center: DVec3::ZERO, radius: 1.2 }];
+        let spans = voxelize((&ball, &[]), &view, 0.0, 7);
+        let surfaces = Surfaces::new(spans, view, 0.0);
+        let optics = Optics {
+            mode: Mode::Refractive,
+            ior: WATER,
+            absorption: Vec3::ZERO,
+            scattering: Vec3::ZERO,
+            depth: 4,
+            skip: true,
+        };
+        let lights = lights();
+        let around = Around {
+            lights: &lights,
+            beyond: &Hues,
+            shown: true,
+            shadow: None,
+            occlusion: None,
+            paint: None,
+            color: Vec3::ONE,
+        };
+        let picture = shade(&surfaces, &optics, &around);
+        let mut error = 0.0;
+        for (i, found) in picture.iter().enumerate() {
+            let (x, y) = (i % 320, i / 320);
+            let (origin, direction) = view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
+            let expected =
+                lens(origin, direction, 1.2).unwrap_or_else(|| Hues::light(direction)).to_array();
+            error += (0..3).map(|c| f64::from(found[c] - expected[c]).powi(2)).sum::<f64>();
+        }
+        let psnr = -10.0 * (error / (3 * 320 * 240) as f64).log10();
+        assert!(psnr >= 35.0, "{projection:?}: {psnr} dB");
+    }
+}
+
+/// Balls here and there, the same each time.
+fn drops(count: u32) -> Vec<Sphere> {
+    let mut random = 11_u64;
+    let mut next = || {
+        random =
+            random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) as f64 / f64::from(1_u32 << 31)
+    };
+    let drop = |_| Sphere {
+        center: DVec3::new(3.0 * next() - 1.5, 2.0 * next() - 1.0, 3.0 * next() - 1.5),
+        radius: 0.02 + 0.3 * next() * next(),
+    };
+    (0..count).map(drop).collect()
+}
+
+#[test]
+fn blocks_change_no_hit() {
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        let view = view((203, 149), projection);
+        let spans = voxelize((&drops(120), &[]), &view, 0.02, 7);
+        let surfaces = Surfaces::new(spans, view, 0.01);
+        let blocks = Blocks::new(&surfaces);
+        let (mut hits, mut plain, mut skipped) = (0, 0, 0);
+        for i in 0..40_000_u32 {
+            let pixel = (i * 7919) as usize % view.pixels();
+            let of = surfaces.of(pixel);
+            if of.is_empty() {
+                continue;
+            }
+            let from = of.start + i as usize % of.len();
+            let place = [(pixel % 203) as f32 + 0.5, (pixel / 203) as f32 + 0.5];
+            let origin = view.point(place, surfaces.nearness[from]);
+            let turn = |k: u32| (f64::from(i * k) * 0.618_033_988_749_895).fract() as f32 - 0.5;
+            let Some(direction) = Vec3::new(turn(3), turn(5), turn(7)).try_normalize() else {
+                continue;
+            };
+            let inside = direction.dot(surfaces.normal(from)) < 0.0;
+            let ray = Ray { origin, direction, inside, from: Some(from) };
+            let ((a, all), (b, some)) =
+                (march(&surfaces, &ray), march_blocks((&surfaces, &blocks), &ray));
+            assert_eq!(a, b, "{projection:?}: {ray:?}");
+            (hits, plain, skipped) =
+                (hits + u32::from(a.is_some()), plain + all, skipped + all - some.min(all));
+        }
+        assert!(hits > 3000 && skipped > plain / 4, "{hits} hits, {skipped} of {plain} skipped");
+    }
+}
+
+#[test]
+fn thickness_is_what_the_ray_passes() {
+    let view = view((64, 48), Projection::Perspective);
+    let balls =
+        [2.0, 5.0, 8.0].map(|z| Sphere { center: DVec3::new(0.0, 0.0, z - 5.0), radius: 1.0 });
+    // Two spans are stored of three; the last counts without what is empty in it.
+    let surfaces = Surfaces::new(voxelize((&balls, &[]), &view, 0.1, 2), view, 0.0);
+    let middle = 24 * 64 + 32;
+    assert!((surfaces.thickness(middle) - 6.0).abs() < 0.02, "{}", surfaces.thickness(middle));
+}
