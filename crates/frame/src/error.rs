@@ -49,6 +49,14 @@ pub enum FrameError {
     /// Bytes that are not the picture they should be.
     #[error("expected a PNG picture: {0}")]
     NotPng(String),
+    /// A file that is not the image it should be.
+    #[error("{}: expected an image (.hdr, .exr or .png): {reason}", .path.display())]
+    NotAnImage {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// The file system said no.
     #[error("{}: {source}", .path.display())]
     File {

@@ -14,7 +14,9 @@
 mod annotate;
 pub mod bench;
 mod error;
+mod environment;
 mod info;
+mod liquid;
 mod opacity;
 mod open;
 mod paint;

@@ -9,7 +9,7 @@ use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_grid::RadiusClasses;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Resolved, Scene, Show};
+use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
@@ -17,6 +17,7 @@ use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
+use crate::liquid::Liquid;
 use crate::system::Loaded;
 use crate::{Error, Result};
 
@@ -202,7 +203,15 @@ impl Session {
         // Lines in space are hidden by depth.
         let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
-        let raw = self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?;
+        let raw = match self.scene.renderer {
+            Renderer::Spheres => {
+                self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?
+            }
+            Renderer::Surface => {
+                let bounds = boxes.iter().copied().reduce(Bounds::union);
+                self.flow(&loaded, (&resolved, origin, bounds), layers, &mut stats)?
+            }
+        };
         stats.ms.insert("trace", milliseconds(start));
 
         let start = Instant::now();
@@ -326,6 +335,22 @@ impl Session {
         Ok(all)
     }
 
+    /// The first system as a liquid.
+    fn flow(
+        &self,
+        loaded: &[Loaded],
+        (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
+        layers: bool,
+        stats: &mut Stats,
+    ) -> Result<Frame> {
+        let [system, ..] = loaded else {
+            return Err(Error::Usage("renderer surface: no system is visible".into()));
+        };
+        let level = Level::new();
+        stats.simd = instruction_set(level).into();
+        Liquid { scene: &self.scene, system, resolved, bounds, origin, level }.draw(layers, stats)
+    }
+
     fn trace(
         &self,
         loaded: &[Loaded],
@@ -420,7 +445,7 @@ fn make_absolute(source: &mut String) {
     }
 }
 
-fn milliseconds(since: Instant) -> f64 {
+pub(crate) fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 

@@ -34,6 +34,7 @@ mod resolve;
 mod scene;
 mod set;
 mod settings;
+pub mod surface;
 mod text;
 
 pub use bounds::Bounds;
@@ -48,7 +49,7 @@ pub use motion::Moment;
 pub use resolve::{Background, Resolved};
 pub use scene::{
     Axis, Camera, ColorBy, Coloring, Component, Film, Filter, Image, Keyframe, Light, Overlay,
-    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Scene, Show, Spheres, System,
-    Tone,
+    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Renderer, Scene, Show, Spheres,
+    System, Tone,
 };
 pub use settings::{Field, Setting, Shape};

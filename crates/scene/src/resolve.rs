@@ -71,12 +71,18 @@ impl Scene {
         check_light(&self.light)?;
         check_film(&self.film)?;
         check_spheres(&self.spheres)?;
+        crate::surface::check(&self.surface)?;
         check_overlay(&self.overlay)
     }
 }
 
 /// `value` at `path` must be what `fits` says, in words `expected`.
-fn need<T: std::fmt::Debug>(path: &str, value: T, fits: bool, expected: &str) -> Result<()> {
+pub(crate) fn need<T: std::fmt::Debug>(
+    path: &str,
+    value: T,
+    fits: bool,
+    expected: &str,
+) -> Result<()> {
     if fits {
         return Ok(());
     }
@@ -91,11 +97,11 @@ fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
 }
 
 /// Above zero and finite, in single precision too.
-fn positive(v: f64) -> bool {
+pub(crate) fn positive(v: f64) -> bool {
     v as f32 > 0.0 && (v as f32).is_finite()
 }
 
-fn not_negative(v: f64) -> bool {
+pub(crate) fn not_negative(v: f64) -> bool {
     v >= 0.0 && v.is_finite()
 }
 
@@ -275,6 +281,15 @@ mod tests {
             (&["spheres.packet=5"], "spheres.packet"),
             (&["spheres.lambda=0"], "spheres.lambda"),
             (&["spheres.block=0"], "spheres.block"),
+            (&["surface.ball=0"], "surface.ball"),
+            (&["surface.gap=-1"], "surface.gap"),
+            (&["surface.spans=0"], "surface.spans"),
+            (&["surface.layers=1000000000"], "surface.layers"),
+            (&["surface.angle=90"], "surface.angle"),
+            (&["surface.tile=6"], "surface.tile"),
+            (&["surface.ior=0"], "surface.ior"),
+            (&["surface.absorption=1,-1,0"], "surface.absorption"),
+            (&["surface.depth=65"], "surface.depth"),
             (&["light.direction=0,0,0"], "light.direction"),
             (&["light.softness=-1"], "light.softness"),
             (&["light.position=nan,0,0"], "light.position"),

@@ -7,10 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::color::Color;
 use crate::settings::{Setting, Shape, settings, words};
+use crate::surface::Surface;
 
 settings! {
     /// All of it: what is seen, from where, in which light, and how the picture is made.
     pub struct Scene {
+        /// The way of seeing: spheres (ray traced) or surface (particles as a liquid).
+        renderer: Renderer = Renderer::Spheres,
         /// What is seen: one entry per set of particles.
         system: Vec<System> = vec![System::default()],
         /// From where.
@@ -23,6 +26,8 @@ settings! {
         film: Film = Film::default(),
         /// The spheres renderer.
         spheres: Spheres = Spheres::default(),
+        /// The surface renderer.
+        surface: Surface = Surface::default(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
     }
@@ -265,6 +270,16 @@ words! {
         Perspective = "perspective",
         /// Farther is as large.
         Orthographic = "orthographic",
+    }
+}
+
+words! {
+    /// The way of seeing.
+    pub enum Renderer {
+        /// Every particle a ball, ray traced.
+        Spheres = "spheres",
+        /// Particles as a liquid with a smooth surface.
+        Surface = "surface",
     }
 }
 

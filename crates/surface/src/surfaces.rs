@@ -65,6 +65,13 @@ impl Surfaces {
         place.map_or(0.0, |place| self.extended[place].empty)
     }
 
+    /// How many spans a pixel truly has.
+    pub fn count(&self, pixel: usize) -> u32 {
+        let place = self.extended.binary_search_by_key(&(pixel as u32), |e| e.pixel);
+        let stored = self.starts[pixel + 1] - self.starts[pixel];
+        place.map_or(stored, |place| self.extended[place].count)
+    }
+
     /// Length inside the liquid, in depth, along the ray of a pixel.
     pub fn thickness(&self, pixel: usize) -> f32 {
         let of = self.of(pixel);

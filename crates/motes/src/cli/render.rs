@@ -37,15 +37,9 @@ pub(crate) struct Args {
     /// Pixels, or 720p, 1080p, 1440p, 4k, 8k
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// The way of seeing: spheres
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "spheres",
-        hide_default_value = true,
-        hide_possible_values = true
-    )]
-    renderer: Renderer,
+    /// The way of seeing: spheres or surface
+    #[arg(long, value_name = "NAME")]
+    renderer: Option<String>,
     /// Frame from 0, frames A..B, all or last
     #[arg(long, value_name = "N|A..B", allow_hyphen_values = true)]
     frame: Option<Frames>,
@@ -195,15 +189,6 @@ struct Overlay {
     no_time: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-enum Renderer {
-    Spheres,
-    #[value(hide = true)]
-    Surface,
-    #[value(hide = true)]
-    Density,
-}
-
 /// As meant.
 struct Plan {
     scene: Scene,
@@ -292,11 +277,6 @@ fn shots(scene: &Scene, (first, last): (usize, usize)) -> Vec<Shot> {
 impl Args {
     /// Refuses nonsense and makes one scene of everything that was typed.
     fn resolve(&self) -> Result<Plan, Failure> {
-        if self.renderer != Renderer::Spheres {
-            let name = format!("{:?}", self.renderer).to_lowercase();
-            let message = format!("--renderer {name}: not in this version; there is spheres");
-            return Err(Failure::usage(message));
-        }
         let mut scene = self.base()?;
         self.edit(&mut scene)?;
         let film = self.is_film(&scene)?;
@@ -372,6 +352,7 @@ impl Args {
         let samples = self.samples.map(|n| n.to_string());
         let transparent = self.transparent.then(|| "true".to_owned());
         let typed = [
+            ("--renderer", "renderer", &self.renderer),
             ("--size", "image.width", &width),
             ("--size", "image.height", &height),
             ("--samples", "image.samples", &samples),

@@ -1,0 +1,333 @@
+//! A system of particles seen as a liquid: from the scene's parameters to the surface renderer's, and from its
+//! picture to a frame.
+
+use std::time::Instant;
+
+use fearless_simd::Level;
+use glam::{DVec3, Vec3};
+use motes_frame::{Frame, Layer};
+use motes_scene::surface::{self, Culling, Spray};
+use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
+use motes_surface::{
+    Around, Bits, Boundary, Cull, Input, Marks, Mode, Occlusion, Optics, Paint, Params, Particles,
+    Representation, Shadow, Spans, Surfaces, View, filter, shade, voxelize,
+};
+
+use crate::environment::sky_of;
+use crate::session::milliseconds;
+use crate::stats::Stats;
+use crate::system::Loaded;
+use crate::{Error, Result};
+
+/// Rows of the light's own view.
+const SHADOW_ROWS: u32 = 1024;
+/// How much of the light on the floor is the sky's.
+const FLOOR_FILL: f32 = 0.45;
+/// What clear water takes of red, green and blue over the width of what is visible.
+const WATER: DVec3 = DVec3::new(2.6, 0.75, 0.45);
+/// Tiles of the floor over the width of what is visible.
+const TILES: f64 = 12.0;
+
+/// What a liquid is drawn from.
+pub(crate) struct Liquid<'a> {
+    pub scene: &'a Scene,
+    pub system: &'a Loaded,
+    pub resolved: &'a Resolved,
+    /// All that is visible, in world coordinates.
+    pub bounds: Option<Bounds>,
+    /// The point that positions are about.
+    pub origin: DVec3,
+    pub level: Level,
+}
+
+impl Liquid<'_> {
+    /// The picture, with `layers` or without.
+    ///
+    /// # Errors
+    /// The environment cannot be read.
+    pub fn draw(&self, layers: bool, stats: &mut Stats) -> Result<Frame> {
+        let image = &self.scene.image;
+        let size = (image.width, image.height);
+        let finer = (f64::from(image.samples).sqrt().floor() as u32).max(1);
+        let Some(bounds) = self.bounds.filter(|_| self.system.count_visible() > 0) else {
+            return self.nothing(layers);
+        };
+        let params = self.params(layers || self.painted());
+        let start = Instant::now();
+        let input = Input {
+            particles: Particles::Grids(&self.system.classes.grids, &self.system.visible),
+            radius_scale: self.scene.surface.ball as f32,
+        };
+        let boundary = Boundary::extract(&input, &params, self.level);
+        stats.ms.insert("boundary", milliseconds(start));
+        stats.particles.insert("splatted", boundary.counts.kept);
+        stats.bytes.insert("boundary", boundary.counts.bytes);
+
+        let environment = self.environment(bounds)?;
+        let lights = self.resolved.lights.about(self.origin);
+        let optics = self.optics(bounds);
+        let start = Instant::now();
+        let shadow = (lights.key.shadow_rays > 0).then(|| self.shadow(&boundary, bounds, &optics));
+        stats.ms.insert("shadow", milliseconds(start));
+        let occlusion = (lights.occlusion_rays > 0 && optics.mode != Mode::Refractive)
+            .then(|| Occlusion::new(4 * lights.occlusion_rays, self.occlusion_radius(&lights)));
+        let around = Around {
+            lights: &lights,
+            beyond: &environment,
+            shown: self.scene.surface.environment != "none" && !image.transparent,
+            shadow: shadow.as_ref(),
+            occlusion: occlusion.as_ref(),
+            paint: self.painted().then_some(self as &dyn Paint),
+            color: Vec3::from(self.scene.surface.color.linear()),
+        };
+        let view = self.view(bounds, finer);
+        let surfaces = self.surfaces((&boundary, &params), view, stats);
+        let start = Instant::now();
+        let color = shade(&surfaces, &optics, &around);
+        let stage = match optics.mode {
+            Mode::Front => "front",
+            Mode::Translucent => "translucent",
+            Mode::Refractive => "refractive",
+        };
+        stats.ms.insert(stage, milliseconds(start));
+        let frame = Frame::new(size.0 as usize, size.1 as usize, halved(&color, size, finer))?;
+        if !layers {
+            return Ok(frame);
+        }
+        // A pixel's own ray is through its centre.
+        let centers = match finer {
+            1 => surfaces,
+            _ => self.surfaces((&boundary, &params), self.view(bounds, 1), &mut Stats::default()),
+        };
+        with_layers(frame, &centers, self.system.number)
+    }
+
+    /// Without particles: the surroundings alone.
+    fn nothing(&self, layers: bool) -> Result<Frame> {
+        let image = &self.scene.image;
+        let view = View {
+            rays: self.resolved.view.rays(self.origin),
+            size: (image.width, image.height),
+            near: 1.0,
+            far: 2.0,
+        };
+        let spans = Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
+        let surfaces = Surfaces::new(spans, view, 0.0);
+        let (width, height) = (image.width as usize, image.height as usize);
+        let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
+        if layers { with_layers(frame, &surfaces, self.system.number) } else { Ok(frame) }
+    }
+
+    /// Whether particles have colours of their own.
+    fn painted(&self) -> bool {
+        self.system.paint.uniform().is_none()
+    }
+
+    /// The mean radius of the particles.
+    fn radius(&self) -> f64 {
+        let grids = self.system.classes.grids.iter();
+        let (sum, count) = grids.fold((0.0, 0), |(sum, count), grid| {
+            let mean = f64::from(grid.least_radius + grid.greatest_radius) / 2.0;
+            (sum + mean * grid.len() as f64, count + grid.len())
+        });
+        sum / count.max(1) as f64
+    }
+
+    fn params(&self, ids: bool) -> Params {
+        let s = &self.scene.surface;
+        Params {
+            gap: s.gap.unwrap_or(2.0 * self.radius()) as f32,
+            spans: s.spans,
+            cull: match s.cull {
+                Culling::Occupancy => Cull::Occupancy,
+                Culling::Count => Cull::Count(s.cull_count),
+                Culling::Off => Cull::Off,
+            },
+            cell: s.cull_cell as f32,
+            representation: match s.representation {
+                surface::Representation::Intervals => Representation::Intervals,
+                surface::Representation::Bits => Representation::Bits(Bits {
+                    angle: s.angle as f32,
+                    layers: s.layers,
+                    marks: Marks::Surface,
+                }),
+            },
+            tile: s.tile,
+            ids,
+        }
+    }
+
+    fn optics(&self, bounds: Bounds) -> Optics {
+        let s = &self.scene.surface;
+        let absorption = s.absorption.unwrap_or(WATER / bounds.diagonal()).as_vec3();
+        Optics {
+            mode: match s.mode {
+                surface::Mode::Front => Mode::Front,
+                surface::Mode::Translucent => Mode::Translucent,
+                surface::Mode::Refractive => Mode::Refractive,
+            },
+            ior: s.ior as f32,
+            absorption,
+            scattering: Vec3::splat(s.scattering.map_or(absorption.x, |v| v as f32)),
+            depth: s.depth,
+            skip: s.skip,
+        }
+    }
+
+    fn occlusion_radius(&self, lights: &Lights) -> f32 {
+        // Crevices are a few particles wide; the spheres' default would reach over whole waves.
+        lights.occlusion_radius.min(12.0 * self.radius() as f32)
+    }
+
+    /// The camera's view, `finer` times as many pixels along each side, from what is nearest to what is
+    /// farthest.
+    fn view(&self, bounds: Bounds, finer: u32) -> View {
+        let camera = &self.resolved.view;
+        let size = (camera.width * finer, camera.height * finer);
+        let whole = CameraView { width: size.0, height: size.1, ..*camera };
+        fitted(&whole, size, (bounds, self.ball()), self.origin)
+    }
+
+    /// Radius of the greatest ball.
+    fn ball(&self) -> f64 {
+        let greatest = self.system.classes.grids.iter().map(|g| g.greatest_radius);
+        self.scene.surface.ball * f64::from(greatest.fold(0.0, f32::max))
+    }
+
+    fn surfaces(
+        &self,
+        (boundary, params): (&Boundary, &Params),
+        view: View,
+        stats: &mut Stats,
+    ) -> Surfaces {
+        let start = Instant::now();
+        let (spans, made) = voxelize(boundary, &view, params, self.level);
+        stats.ms.insert("splat", milliseconds(start));
+        stats.bytes.insert("spans", made.span_bytes);
+        if made.layers > 0 {
+            stats.counts.insert("layers", made.layers as u64);
+            stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
+        }
+        let start = Instant::now();
+        let smoothing = self.scene.surface.smoothing.unwrap_or(2.0 * self.radius()) as f32;
+        let surfaces = Surfaces::new(spans, view, smoothing);
+        stats.ms.insert("filter", milliseconds(start));
+        stats.bytes.insert("surfaces", surfaces.bytes());
+        surfaces
+    }
+
+    /// The liquid as the key light sees it.
+    fn shadow(&self, boundary: &Boundary, bounds: Bounds, optics: &Optics) -> Shadow {
+        let mut camera = self.scene.camera.clone();
+        let key = &self.resolved.lights.key;
+        camera.projection = motes_scene::Projection::Orthographic;
+        (camera.position, camera.target, camera.height) = (None, None, None);
+        camera.direction = Some(-key.direction.as_dvec3());
+        camera.margin = 0.02;
+        let size = (SHADOW_ROWS, SHADOW_ROWS);
+        let framing = motes_scene::Framing { boxes: &[bounds], free_right: 0.0 };
+        let light = CameraView::new(&camera, framing, size);
+        let view = fitted(&light, size, (bounds, self.ball()), self.origin);
+        let params = Params { ids: false, ..self.params(false) };
+        let (spans, _) = voxelize(boundary, &view, &params, self.level);
+        let mean = optics.absorption.element_sum() / 3.0;
+        // What is opaque lets nothing through that is thicker than a ball.
+        let extinction = match optics.mode {
+            Mode::Front => 4.0 / self.ball() as f32,
+            Mode::Translucent => mean + optics.scattering.element_sum() / 3.0,
+            Mode::Refractive => mean,
+        };
+        Shadow { view, spans, extinction, offset: 2.0 * self.ball() as f32, fill: FLOOR_FILL }
+    }
+
+    fn environment(&self, bounds: Bounds) -> Result<Environment> {
+        let up = self.scene.camera.up_axis.vector();
+        let (resolved, name) = (self.resolved, &self.scene.surface.environment);
+        let sun = resolved.lights.key.direction;
+        let background = &resolved.background;
+        Ok(match name.as_str() {
+            "none" => {
+                let (top, bottom) = (background.top, background.bottom);
+                let sky = Sky::Gradient { up: up.as_vec3(), top, bottom };
+                Environment { sky, floor: None }
+            }
+            "sky" => {
+                let sky = Sky::Day { up: up.as_vec3(), sun };
+                let across = bounds.diagonal();
+                let lowest = bounds.corners().iter().map(|c| c.dot(up)).fold(f64::INFINITY, f64::min);
+                let center = bounds.center();
+                let point = center + up * (lowest - center.dot(up) - 0.002 * across) - self.origin;
+                let floor = Floor {
+                    point: point.as_vec3(),
+                    up: up.as_vec3(),
+                    tile: (across / TILES) as f32,
+                    colors: [Vec3::new(0.80, 0.79, 0.76), Vec3::new(0.50, 0.54, 0.58)],
+                    fade: (3.0 * across) as f32,
+                    grain: (2.0 * resolved.view.half_height / f64::from(resolved.view.height)) as f32,
+                };
+                Environment { sky, floor: Some(floor) }
+            }
+            path => Environment { sky: sky_of(path, up.as_vec3())?, floor: None },
+        })
+    }
+}
+
+impl Paint for Liquid<'_> {
+    fn color(&self, particle: u32) -> Vec3 {
+        self.system.paint.color(particle)
+    }
+}
+
+/// The view of a camera, from what is nearest of `bounds` with balls of a radius about it to what is
+/// farthest.
+fn fitted(camera: &CameraView, size: (u32, u32), (bounds, ball): (Bounds, f64), origin: DVec3) -> View {
+    let depths = bounds.corners().map(|c| (c - camera.eye).dot(camera.forward));
+    let nearest = depths.iter().copied().fold(f64::INFINITY, f64::min) - ball;
+    let farthest = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max) + ball;
+    let far = farthest.max(1e-6 * bounds.diagonal());
+    let near = nearest.max(1e-4 * far);
+    View { rays: camera.rays(origin), size, near: near as f32, far: (far * 1.000_001) as f32 }
+}
+
+/// A picture of which each pixel is the mean of `finer`² of `color`.
+fn halved(color: &[[f32; 4]], (width, height): (u32, u32), finer: u32) -> Vec<[f32; 4]> {
+    if finer == 1 {
+        return color.to_vec();
+    }
+    let (width, finer) = (width as usize, finer as usize);
+    let part = 1.0 / (finer * finer) as f32;
+    let pixel = |i: usize| {
+        let [x, y] = [i % width * finer, i / width * finer];
+        let rows = (y..y + finer).map(|y| &color[y * width * finer + x..][..finer]);
+        let sum = rows.flatten().fold([0.0; 4], |s: [f32; 4], c| [0, 1, 2, 3].map(|i| s[i] + c[i]));
+        sum.map(|s| s * part)
+    };
+    (0..width * height as usize).map(pixel).collect()
+}
+
+/// Adds what is known of each pixel besides its colour.
+fn with_layers(frame: Frame, surfaces: &Surfaces, system: u16) -> Result<Frame> {
+    let view = &surfaces.view;
+    let width = view.size.0 as usize;
+    let pixels = 0..view.pixels();
+    let first = |pixel: usize| Some(surfaces.of(pixel).start).filter(|_| !surfaces.of(pixel).is_empty());
+    // World units per unit of depth.
+    let slant = |pixel: usize| {
+        let [x, y] = [pixel % width, pixel / width].map(|i| i as f32 + 0.5);
+        1.0 / view.rays.ray(x, y).1.dot(view.rays.forward)
+    };
+    let depth = |p| first(p).map_or(f32::INFINITY, |s| surfaces.depth(s) * slant(p));
+    let id = |p| {
+        let of = first(p).and_then(|s| surfaces.particles.get(s));
+        of.filter(|id| **id != Spans::NO_PARTICLE).map_or(-1, |id| i64::from(*id))
+    };
+    let normal = |p| first(p).map_or([0.0; 3], |s| surfaces.normal(s).to_array());
+    let frame = frame
+        .with(Layer::Depth(pixels.clone().map(depth).collect()))?
+        .with(Layer::Normal(pixels.clone().map(normal).collect()))?
+        .with(Layer::Id(pixels.clone().map(id).collect()))?
+        .with(Layer::System(pixels.clone().map(|_| system).collect()))?
+        .with(Layer::SpanCount(pixels.clone().map(|p| surfaces.count(p)).collect()))?
+        .with(Layer::Thickness(pixels.map(|p| surfaces.thickness(p) * slant(p)).collect()))?;
+    Ok(frame)
+}
