@@ -13,8 +13,8 @@
 
 mod annotate;
 pub mod bench;
-mod error;
 mod environment;
+mod error;
 mod info;
 mod liquid;
 mod opacity;

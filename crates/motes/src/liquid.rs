@@ -6,11 +6,11 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
-use motes_scene::surface::{self, Culling, Spray};
+use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Input, Marks, Mode, Occlusion, Optics, Paint, Params, Particles,
-    Representation, Shadow, Spans, Surfaces, View, filter, shade, voxelize,
+    Representation, Shadow, Smoothing, Spans, Surfaces, View, shade, voxelize,
 };
 
 use crate::environment::sky_of;
@@ -111,8 +111,9 @@ impl Liquid<'_> {
             near: 1.0,
             far: 2.0,
         };
-        let spans = Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
-        let surfaces = Surfaces::new(spans, view, 0.0);
+        let spans =
+            Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
+        let surfaces = Surfaces::new(spans, view, Smoothing::None);
         let (width, height) = (image.width as usize, image.height as usize);
         let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
         if layers { with_layers(frame, &surfaces, self.system.number) } else { Ok(frame) }
@@ -209,11 +210,21 @@ impl Liquid<'_> {
             stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
         }
         let start = Instant::now();
-        let smoothing = self.scene.surface.smoothing.unwrap_or(2.0 * self.radius()) as f32;
-        let surfaces = Surfaces::new(spans, view, smoothing);
+        let surfaces = Surfaces::new(spans, view, self.smoothing());
         stats.ms.insert("filter", milliseconds(start));
         stats.bytes.insert("surfaces", surfaces.bytes());
         surfaces
+    }
+
+    fn smoothing(&self) -> Smoothing {
+        let s = &self.scene.surface;
+        let radius = s.smoothing.unwrap_or(2.0 * self.radius()) as f32;
+        match s.filter {
+            _ if radius <= 0.0 => Smoothing::None,
+            Filtering::Recursive => Smoothing::Recursive(radius),
+            Filtering::Iterated => Smoothing::Iterated(radius, s.iterations),
+            Filtering::Curvature => Smoothing::Curvature(radius, s.iterations),
+        }
     }
 
     /// The liquid as the key light sees it.
@@ -254,7 +265,8 @@ impl Liquid<'_> {
             "sky" => {
                 let sky = Sky::Day { up: up.as_vec3(), sun };
                 let across = bounds.diagonal();
-                let lowest = bounds.corners().iter().map(|c| c.dot(up)).fold(f64::INFINITY, f64::min);
+                let lowest =
+                    bounds.corners().iter().map(|c| c.dot(up)).fold(f64::INFINITY, f64::min);
                 let center = bounds.center();
                 let point = center + up * (lowest - center.dot(up) - 0.002 * across) - self.origin;
                 let floor = Floor {
@@ -263,7 +275,8 @@ impl Liquid<'_> {
                     tile: (across / TILES) as f32,
                     colors: [Vec3::new(0.80, 0.79, 0.76), Vec3::new(0.50, 0.54, 0.58)],
                     fade: (3.0 * across) as f32,
-                    grain: (2.0 * resolved.view.half_height / f64::from(resolved.view.height)) as f32,
+                    grain: (2.0 * resolved.view.half_height / f64::from(resolved.view.height))
+                        as f32,
                 };
                 Environment { sky, floor: Some(floor) }
             }
@@ -280,7 +293,12 @@ impl Paint for Liquid<'_> {
 
 /// The view of a camera, from what is nearest of `bounds` with balls of a radius about it to what is
 /// farthest.
-fn fitted(camera: &CameraView, size: (u32, u32), (bounds, ball): (Bounds, f64), origin: DVec3) -> View {
+fn fitted(
+    camera: &CameraView,
+    size: (u32, u32),
+    (bounds, ball): (Bounds, f64),
+    origin: DVec3,
+) -> View {
     let depths = bounds.corners().map(|c| (c - camera.eye).dot(camera.forward));
     let nearest = depths.iter().copied().fold(f64::INFINITY, f64::min) - ball;
     let farthest = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max) + ball;
@@ -310,7 +328,8 @@ fn with_layers(frame: Frame, surfaces: &Surfaces, system: u16) -> Result<Frame> 
     let view = &surfaces.view;
     let width = view.size.0 as usize;
     let pixels = 0..view.pixels();
-    let first = |pixel: usize| Some(surfaces.of(pixel).start).filter(|_| !surfaces.of(pixel).is_empty());
+    let first =
+        |pixel: usize| Some(surfaces.of(pixel).start).filter(|_| !surfaces.of(pixel).is_empty());
     // World units per unit of depth.
     let slant = |pixel: usize| {
         let [x, y] = [pixel % width, pixel / width].map(|i| i as f32 + 0.5);

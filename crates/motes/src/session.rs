@@ -13,11 +13,11 @@ use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolve
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
+use crate::liquid::Liquid;
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::liquid::Liquid;
 use crate::system::Loaded;
 use crate::{Error, Result};
 

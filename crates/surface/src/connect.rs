@@ -123,6 +123,40 @@ fn connect_columns(own: &[f32], next: &[f32], (links, side): (&mut [Links], Side
     }
 }
 
+/// Columns and their surfaces, to be followed along links.
+pub(crate) struct Net<'a> {
+    spans: &'a Spans,
+    links: &'a [Links],
+    size: [usize; 2],
+}
+
+/// A surface and the pixel that it is in.
+#[derive(Clone, Copy)]
+pub(crate) struct Place {
+    pub pixel: [usize; 2],
+    pub surface: usize,
+}
+
+impl<'a> Net<'a> {
+    pub fn new(spans: &'a Spans, links: &'a [Links]) -> Self {
+        Self { spans, links, size: [spans.size.0 as usize, spans.size.1 as usize] }
+    }
+
+    /// The surface that `from` is linked to at a side.
+    #[inline]
+    pub fn follow(&self, from: Place, side: Side) -> Place {
+        match self.links[from.surface][side as usize] {
+            PRECEDING => Place { surface: from.surface - 1, ..from },
+            FOLLOWING => Place { surface: from.surface + 1, ..from },
+            link => {
+                let Some(pixel) = side.neighbor(from.pixel, self.size) else { return from };
+                let first = self.spans.starts[pixel[1] * self.size[0] + pixel[0]];
+                Place { pixel, surface: 2 * first as usize + link as usize }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,6 +11,7 @@
 mod blocks;
 pub mod connect;
 pub mod filter;
+pub mod flow;
 pub mod march;
 pub mod normals;
 mod occlusion;
@@ -29,5 +30,5 @@ pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
 pub use shade::{Around, Mode, Optics, Paint, shade};
 pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
-pub use surfaces::Surfaces;
+pub use surfaces::{Smoothing, Surfaces};
 pub use view::View;

@@ -15,7 +15,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::connect::{FOLLOWING, Links, PRECEDING, Side, rows_mut};
+use crate::connect::{Links, Net, Place, Side, rows_mut};
 use crate::{Spans, View};
 use motes_scene::Projection;
 
@@ -43,35 +43,7 @@ pub fn unpack(word: u32) -> Vec3 {
     Vec3::new(p.x, p.y, z).normalize()
 }
 
-/// Columns and their surfaces, to be followed along links.
-struct Net<'a> {
-    spans: &'a Spans,
-    links: &'a [Links],
-    size: [usize; 2],
-}
-
-/// A surface and the pixel that it is in.
-#[derive(Clone, Copy)]
-struct Place {
-    pixel: [usize; 2],
-    surface: usize,
-}
-
 impl Net<'_> {
-    /// The surface that `from` is linked to at a side.
-    #[inline]
-    fn follow(&self, from: Place, side: Side) -> Place {
-        match self.links[from.surface][side as usize] {
-            PRECEDING => Place { surface: from.surface - 1, ..from },
-            FOLLOWING => Place { surface: from.surface + 1, ..from },
-            link => {
-                let Some(pixel) = side.neighbor(from.pixel, self.size) else { return from };
-                let first = self.spans.starts[pixel[1] * self.size[0] + pixel[0]];
-                Place { pixel, surface: 2 * first as usize + link as usize }
-            }
-        }
-    }
-
     /// Sobel's operator between two sides, the mean of rows `across` weighted 1, 2, 1: the difference per
     /// pixel.
     #[inline]
@@ -90,7 +62,7 @@ impl Net<'_> {
 /// The normal of every surface, packed, from its nearness (see [`crate::filter::nearness`]).
 pub fn normals(values: &[f32], (spans, links): (&Spans, &[Links]), view: &View) -> Vec<u32> {
     let size = [spans.size.0 as usize, spans.size.1 as usize];
-    let net = Net { spans, links, size };
+    let net = Net::new(spans, links);
     let mut normals = vec![0; values.len()];
     rows_mut(&mut normals, spans).into_par_iter().enumerate().for_each(|(y, row)| {
         let first = 2 * spans.starts[y * size[0]] as usize;

@@ -5,10 +5,10 @@ use std::ops::Range;
 use glam::Vec3;
 use motes_scene::Projection;
 
-use crate::connect::connect;
+use crate::connect::{Links, connect};
 use crate::filter::{self, Scale};
 use crate::normals::{normals, unpack};
-use crate::{Extended, Spans, View};
+use crate::{Extended, Spans, View, flow};
 
 /// The ends of all spans, smoothed, with normals: all that pictures are made from.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,15 +27,41 @@ pub struct Surfaces {
     pub particles: Vec<u32>,
 }
 
+/// How surfaces are smoothed; lengths are standard deviations in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Smoothing {
+    /// Not at all.
+    None,
+    /// As [`filter::smooth`] does.
+    Recursive(f32),
+    /// As [`flow::iterate`] does, at most so many times.
+    Iterated(f32, u32),
+    /// As [`flow::curvature`] does, at most so many times.
+    Curvature(f32, u32),
+}
+
+impl Smoothing {
+    /// Smooths the [`filter::nearness`] of each surface.
+    pub fn apply(self, nearness: &mut Vec<f32>, net: (&Spans, &[Links]), view: &View) {
+        match self {
+            Self::None => {}
+            Self::Recursive(radius) => filter::smooth(nearness, net, &Scale::new(radius, view)),
+            Self::Iterated(radius, most) => {
+                flow::iterate(nearness, net, (&Scale::new(radius, view), most));
+            }
+            Self::Curvature(radius, most) => {
+                flow::curvature(nearness, net, (&Scale::new(radius, view), most), view);
+            }
+        }
+    }
+}
+
 impl Surfaces {
-    /// Connects, smooths by the standard deviation `smoothing` (world units; 0: not at all) and finds the
-    /// normals of `spans`, which `view` shows.
-    pub fn new(spans: Spans, view: View, smoothing: f32) -> Self {
+    /// Connects, smooths and finds the normals of `spans`, which `view` shows.
+    pub fn new(spans: Spans, view: View, smoothing: Smoothing) -> Self {
         let links = connect(&spans);
         let mut nearness = filter::nearness(&spans, view.rays.projection);
-        if smoothing > 0.0 {
-            filter::smooth(&mut nearness, (&spans, &links), &Scale::new(smoothing, &view));
-        }
+        smoothing.apply(&mut nearness, (&spans, &links), &view);
         let normals = normals(&nearness, (&spans, &links), &view);
         let Spans { starts, extended, particles, .. } = spans;
         Self { view, starts, nearness, normals, extended, particles }
