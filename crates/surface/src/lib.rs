@@ -1,17 +1,29 @@
 //! The liquid's surface from unsorted particles, without a mesh.
 //!
-//! Zirr & Dachsbacher 2015, *Memory-Efficient On-The-Fly Voxelization of Particle Data*: what each
-//! pixel's ray passes of the liquid, as a short list of [`Spans`].
+//! Zirr & Dachsbacher 2015, *Memory-Efficient On-The-Fly Voxelization of Particle Data*. The paper's stages:
 //!
-//! - [`mod@reference`]: brute force in f64, the definition; for tests
+//! - [`Boundary`]: what has to be drawn of a liquid, whatever the view
+//! - splat and compress, [`voxelize()`]: what each pixel's ray passes of it, a short list of [`Spans`]
+//! - [`mod@connect`]: which of their ends are one surface
+//! - [`mod@filter`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
+//! - [`shade()`]: pictures, with rays that [`mod@march`] through columns
+//!
+//! [`mod@reference`] is the definition of spans, by brute force in f64; for tests.
 //!
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of
 //! threads or the size of tiles.
 
+mod bits;
 mod blocks;
+mod boundary;
+mod compress;
 pub mod connect;
+mod cull;
 pub mod filter;
 pub mod flow;
+mod intervals;
+mod items;
+mod layers;
 pub mod march;
 pub mod normals;
 mod occlusion;
@@ -20,11 +32,16 @@ pub mod reference;
 mod refract;
 mod shade;
 mod shadow;
+mod source;
 mod spans;
+mod splat;
 mod surfaces;
+mod tile;
 mod view;
+mod voxelize;
 
 pub use blocks::Blocks;
+pub use boundary::{Boundary, BoundaryCounts};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
 pub use shade::{Around, Mode, Optics, Paint, shade};
@@ -32,3 +49,7 @@ pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
 pub use surfaces::{Smoothing, Surfaces};
 pub use view::View;
+pub use voxelize::{Stats, voxelize};
+
+#[cfg(test)]
+mod truth_tests;
