@@ -9,15 +9,15 @@ use motes_frame::{Frame, Layer};
 use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
-    Around, Bits, Boundary, Cull, Input, Marks, Mode, Occlusion, Optics, Paint, Params, Particles,
-    Representation, Shadow, Smoothing, Spans, Surfaces, View, shade, voxelize,
+    Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
+    Particles, Representation, Shadow, Smoothing, Spans, Surfaces, View, shade, voxelize,
 };
 
+use crate::Result;
 use crate::environment::sky_of;
 use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
-use crate::{Error, Result};
 
 /// Rows of the light's own view.
 const SHADOW_ROWS: u32 = 1024;
@@ -113,7 +113,7 @@ impl Liquid<'_> {
         };
         let spans =
             Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
-        let surfaces = Surfaces::new(spans, view, Smoothing::None);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
         let (width, height) = (image.width as usize, image.height as usize);
         let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
         if layers { with_layers(frame, &surfaces, self.system.number) } else { Ok(frame) }
@@ -137,7 +137,7 @@ impl Liquid<'_> {
     fn params(&self, ids: bool) -> Params {
         let s = &self.scene.surface;
         Params {
-            gap: s.gap.unwrap_or(2.0 * self.radius()) as f32,
+            gap: s.gap.unwrap_or(5.0 * self.radius()) as f32,
             spans: s.spans,
             cull: match s.cull {
                 Culling::Occupancy => Cull::Occupancy,
@@ -219,12 +219,12 @@ impl Liquid<'_> {
     fn smoothing(&self) -> Smoothing {
         let s = &self.scene.surface;
         let radius = s.smoothing.unwrap_or(2.0 * self.radius()) as f32;
-        match s.filter {
-            _ if radius <= 0.0 => Smoothing::None,
-            Filtering::Recursive => Smoothing::Recursive(radius),
-            Filtering::Iterated => Smoothing::Iterated(radius, s.iterations),
-            Filtering::Curvature => Smoothing::Curvature(radius, s.iterations),
-        }
+        let filter = match s.filter {
+            Filtering::Recursive => Filter::Recursive,
+            Filtering::Iterated => Filter::Iterated(s.iterations),
+            Filtering::Curvature => Filter::Curvature(s.iterations),
+        };
+        Smoothing { radius, drop: (2.0 * s.ball * self.radius()) as f32, filter }
     }
 
     /// The liquid as the key light sees it.

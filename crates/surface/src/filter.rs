@@ -13,7 +13,8 @@
 //! once in each direction: each sweep has the variance a/(1 − a)², so that with [`ROUNDS`] rounds and the
 //! standard deviation σ pixels, a/(1 − a)² = v = σ²/(2·ROUNDS) and a = (1 + 2·v − √(1 + 4·v)) / (2·v).
 //! A sweep begins anew where a surface ends, and where it leaps by more than [`LEAP`] σ from one pixel to
-//! the next, as what lies there before something else is not smeared over it.
+//! the next, as what lies there before something else is not smeared over it. What is no thicker than a ball,
+//! a drop, stays round; from there on smoothing sets in with thickness.
 
 use rayon::prelude::*;
 
@@ -24,7 +25,9 @@ use motes_scene::Projection;
 /// Sweeps forth and back over rows and columns.
 const ROUNDS: u32 = 2;
 /// Leaps of so many standard deviations end a surface.
-const LEAP: f32 = 6.0;
+const LEAP: f32 = 8.0;
+/// What is thicker than a drop by this part is smoothed fully.
+const THICK: f32 = 0.5;
 /// Columns of pixels that are swept together: the values of their rows stay in cache.
 const STRIP: usize = 64;
 
@@ -54,15 +57,21 @@ pub struct Scale {
     sigma: f32,
     /// What is a leap: in the world.
     leap: f32,
+    /// Diameter of a drop, in the world, and what part of smoothing each unit of thickness brings beyond it.
+    drop: f32,
+    per_thickness: f32,
     projection: Projection,
 }
 
 impl Scale {
-    /// Smoothing with the standard deviation `radius`, in world units, as `view` shows it.
-    pub fn new(radius: f32, view: &View) -> Self {
+    /// Smoothing with the standard deviation `radius`, in world units, as `view` shows it, of what is thicker
+    /// than a `drop`.
+    pub fn new(radius: f32, drop: f32, view: &View) -> Self {
         Self {
             sigma: radius / view.rays.pixel,
             leap: LEAP * radius,
+            drop,
+            per_thickness: 1.0 / (THICK * drop).max(f32::MIN_POSITIVE),
             projection: view.rays.projection,
         }
     }
@@ -85,10 +94,20 @@ impl Scale {
         }
     }
 
-    /// The recursion's factor a.
+    /// The part of the standard deviation for a span between two values of nearness.
     #[inline]
-    fn factor(&self, nearness: f32) -> f32 {
-        let sigma = self.sigma(nearness);
+    fn part(&self, [a, b]: [f32; 2]) -> f32 {
+        let thickness = match self.projection {
+            Projection::Perspective => (a - b).abs() / (a * b),
+            Projection::Orthographic => (a - b).abs(),
+        };
+        ((thickness - self.drop) * self.per_thickness).clamp(0.0, 1.0)
+    }
+
+    /// The recursion's factor a for one end of a span with this other end.
+    #[inline]
+    fn factor(&self, nearness: f32, other: f32) -> f32 {
+        let sigma = self.sigma(nearness) * self.part([nearness, other]);
         let v = sigma * sigma / (2 * ROUNDS) as f32;
         // The same as above without the difference of large numbers.
         2.0 * v / (1.0 + 2.0 * v + (1.0 + 4.0 * v).sqrt())
@@ -117,7 +136,7 @@ fn sweep_rows(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Sc
             for i in from..to {
                 let link = links[i][Side::Left as usize];
                 if link < PRECEDING {
-                    row[i] = drawn(row[i], row[before + link as usize], scale);
+                    row[i] = drawn([row[i], row[i ^ 1]], row[before + link as usize], scale);
                 }
             }
         }
@@ -126,21 +145,21 @@ fn sweep_rows(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Sc
             for i in from..to {
                 let link = links[i][Side::Right as usize];
                 if link < PRECEDING {
-                    row[i] = drawn(row[i], row[to + link as usize], scale);
+                    row[i] = drawn([row[i], row[i ^ 1]], row[to + link as usize], scale);
                 }
             }
         }
     });
 }
 
-/// The value `own` drawn towards the one before it.
+/// The value `own` of a surface, at the other end of whose span is `other`, drawn towards the one before it.
 #[inline]
-fn drawn(own: f32, before: f32, scale: &Scale) -> f32 {
+fn drawn([own, other]: [f32; 2], before: f32, scale: &Scale) -> f32 {
     let difference = before - own;
     if difference.abs() > scale.leap(own) {
         return own;
     }
-    own + scale.factor(own) * difference
+    own + scale.factor(own, other) * difference
 }
 
 fn sweep_columns(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale) {
@@ -187,7 +206,7 @@ fn sweep_row(
             let i = i as usize;
             let link = links[i][side as usize];
             if link < PRECEDING {
-                row[i] = drawn(row[i], before[from + link as usize], scale);
+                row[i] = drawn([row[i], row[i ^ 1]], before[from + link as usize], scale);
             }
         }
     }
@@ -229,7 +248,7 @@ pub(crate) mod tests {
 
     fn smoothed(spans: &Spans, radius: f32, projection: Projection) -> Vec<f32> {
         let mut values = nearness(spans, projection);
-        let scale = Scale::new(radius, &view(spans.size, projection));
+        let scale = Scale::new(radius, 0.0, &view(spans.size, projection));
         smooth(&mut values, (spans, &connect(spans)), &scale);
         values.into_iter().map(|n| depth(n, projection)).collect()
     }

@@ -47,7 +47,7 @@ pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
 pub use shade::{Around, Mode, Optics, Paint, shade};
 pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
-pub use surfaces::{Smoothing, Surfaces};
+pub use surfaces::{Filter, Smoothing, Surfaces};
 pub use view::View;
 pub use voxelize::{Stats, voxelize};
 

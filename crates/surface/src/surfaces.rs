@@ -27,31 +27,42 @@ pub struct Surfaces {
     pub particles: Vec<u32>,
 }
 
-/// How surfaces are smoothed; lengths are standard deviations in world units.
+/// How surfaces are smoothed; lengths in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Smoothing {
-    /// Not at all.
-    None,
+pub struct Smoothing {
+    /// The standard deviation; 0: not at all.
+    pub radius: f32,
+    /// Diameter of drops, which recursion leaves as they are.
+    pub drop: f32,
+    /// The way.
+    pub filter: Filter,
+}
+
+/// A way to smooth surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter {
     /// As [`filter::smooth`] does.
-    Recursive(f32),
+    Recursive,
     /// As [`flow::iterate`] does, at most so many times.
-    Iterated(f32, u32),
+    Iterated(u32),
     /// As [`flow::curvature`] does, at most so many times.
-    Curvature(f32, u32),
+    Curvature(u32),
 }
 
 impl Smoothing {
+    /// None.
+    pub const NONE: Self = Self { radius: 0.0, drop: 0.0, filter: Filter::Recursive };
+
     /// Smooths the [`filter::nearness`] of each surface.
     pub fn apply(self, nearness: &mut Vec<f32>, net: (&Spans, &[Links]), view: &View) {
-        match self {
-            Self::None => {}
-            Self::Recursive(radius) => filter::smooth(nearness, net, &Scale::new(radius, view)),
-            Self::Iterated(radius, most) => {
-                flow::iterate(nearness, net, (&Scale::new(radius, view), most));
-            }
-            Self::Curvature(radius, most) => {
-                flow::curvature(nearness, net, (&Scale::new(radius, view), most), view);
-            }
+        if self.radius <= 0.0 {
+            return;
+        }
+        let scale = Scale::new(self.radius, self.drop, view);
+        match self.filter {
+            Filter::Recursive => filter::smooth(nearness, net, &scale),
+            Filter::Iterated(most) => flow::iterate(nearness, net, (&scale, most)),
+            Filter::Curvature(most) => flow::curvature(nearness, net, (&scale, most), view),
         }
     }
 }
