@@ -26,7 +26,7 @@ const FLOOR_FILL: f32 = 0.45;
 /// What clear water takes of red, green and blue over the width of what is visible.
 const WATER: DVec3 = DVec3::new(2.6, 0.75, 0.45);
 /// Tiles of the floor over the width of what is visible.
-const TILES: f64 = 12.0;
+const TILES: f64 = 8.0;
 
 /// What a liquid is drawn from.
 pub(crate) struct Liquid<'a> {
@@ -273,10 +273,8 @@ impl Liquid<'_> {
                     point: point.as_vec3(),
                     up: up.as_vec3(),
                     tile: (across / TILES) as f32,
-                    colors: [Vec3::new(0.80, 0.79, 0.76), Vec3::new(0.50, 0.54, 0.58)],
+                    colors: [Vec3::new(0.80, 0.79, 0.76), Vec3::new(0.62, 0.64, 0.66)],
                     fade: (3.0 * across) as f32,
-                    grain: (2.0 * resolved.view.half_height / f64::from(resolved.view.height))
-                        as f32,
                 };
                 Environment { sky, floor: Some(floor) }
             }

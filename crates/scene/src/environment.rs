@@ -7,10 +7,25 @@ use glam::Vec3;
 
 /// What a ray meets outside its medium: surroundings, floor, particles of another system.
 pub trait Beyond: Sync {
-    /// The linear light that comes from the first thing the ray from `origin` along the unit vector
-    /// `direction` meets within `reach`, or, if `reach` is infinite, from the surroundings where there is
-    /// nothing; with the distance to it. `None` if there is nothing within a finite `reach`.
-    fn meet(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)>;
+    /// The linear light that comes from the first thing met within reach, or, if the reach is infinite, from
+    /// the surroundings where there is nothing; with the distance to it. `None` if there is nothing within a
+    /// finite reach.
+    fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)>;
+}
+
+/// A ray that is a narrow cone: nothing finer than its width is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// How far it goes.
+    pub reach: f32,
+    /// Its width at its start, in world units.
+    pub width: f32,
+    /// What its width grows by per unit of length.
+    pub spread: f32,
 }
 
 /// The surroundings, about the same origin as the particles.
@@ -74,8 +89,6 @@ pub struct Floor {
     pub colors: [Vec3; 2],
     /// Distance from `point` at which it has faded by 1/e.
     pub fade: f32,
-    /// Width of a pixel at distance 1: nothing finer is shown.
-    pub grain: f32,
 }
 
 /// Width of a joint between tiles, in tiles.
@@ -89,7 +102,8 @@ impl Environment {
 }
 
 impl Beyond for Environment {
-    fn meet(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)> {
+    fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)> {
+        let Sight { origin, direction, reach, .. } = *sight;
         let met = self.floor.and_then(|floor| {
             let distance = floor.distance(origin, direction)?;
             (distance <= reach).then_some((floor, distance))
@@ -99,7 +113,7 @@ impl Beyond for Environment {
                 let point = origin + direction * distance;
                 let seen = (point - floor.point).reject_from_normalized(floor.up);
                 let slant = direction.dot(floor.up).abs().sqrt();
-                let wide = floor.grain * distance / slant;
+                let wide = (sight.width + sight.spread * distance) / slant;
                 let left = (-seen.length() / floor.fade).exp();
                 // A distant floor is the haze at the horizon.
                 let level = direction.reject_from_normalized(floor.up);
@@ -202,13 +216,16 @@ mod tests {
             tile: 1.0,
             colors: [Vec3::ONE, Vec3::ZERO],
             fade: 1e9,
-            grain: 1e-4,
         };
         Environment { sky, floor: Some(floor) }
     }
 
+    fn sight(origin: Vec3, direction: Vec3, reach: f32) -> Sight {
+        Sight { origin, direction: direction.normalize(), reach, width: 1e-4, spread: 0.0 }
+    }
+
     fn seen(from: [f32; 3], direction: [f32; 3]) -> Option<(Vec3, f32)> {
-        environment().meet(from.into(), Vec3::from(direction).normalize(), f32::INFINITY)
+        environment().meet(&sight(from.into(), Vec3::from(direction), f32::INFINITY))
     }
 
     #[test]
@@ -230,10 +247,9 @@ mod tests {
 
     #[test]
     fn far_tiles_are_their_mean() {
-        // A pixel here is as wide as many tiles.
-        let mut far = environment();
-        far.floor = far.floor.map(|floor| Floor { grain: 1.0, ..floor });
-        let light = far.meet(Vec3::new(0.3, 0.4, 500.0), -Vec3::Z, f32::INFINITY);
+        // The cone is as wide as many tiles there.
+        let far = sight(Vec3::new(0.3, 0.4, 500.0), -Vec3::Z, f32::INFINITY);
+        let light = environment().meet(&Sight { spread: 1.0, ..far });
         let expected = 0.5 * (1.0 - 0.4 * (1.0 - (1.0 - JOINT).powi(2)));
         assert!(light.is_some_and(|(l, _)| (l.x - expected).abs() < 1e-2), "{light:?}");
     }
@@ -242,8 +258,8 @@ mod tests {
     fn only_the_floor_is_within_reach() {
         let environment = environment();
         let from = Vec3::new(0.5, 0.5, 2.0);
-        assert!(environment.meet(from, -Vec3::Z, 1.9).is_none());
-        assert!(environment.meet(from, -Vec3::Z, 2.1).is_some());
+        assert!(environment.meet(&sight(from, -Vec3::Z, 1.9)).is_none());
+        assert!(environment.meet(&sight(from, -Vec3::Z, 2.1)).is_some());
     }
 
     #[test]

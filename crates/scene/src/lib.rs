@@ -42,7 +42,7 @@ pub use camera::{CameraView, Framing, Lens, Projected, Rays};
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use colormap::ColorMap;
 pub use elements::Element;
-pub use environment::{Beyond, Environment, Equirectangular, Floor, Sky};
+pub use environment::{Beyond, Environment, Equirectangular, Floor, Sight, Sky};
 pub use error::{Result, SceneError, nearest};
 pub use light::{KeyLight, Lamp, Lights, Toward};
 pub use motion::Moment;

@@ -30,11 +30,15 @@ struct Block {
     count: usize,
 }
 
-/// The blocks of a picture.
+/// The blocks of a picture, with their surfaces: those of a block lie together, for rays that go up and down.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     blocks: Vec<Block>,
     across: usize,
+    /// Nearness of each surface, block after block, column after column.
+    nearness: Vec<f32>,
+    /// Where each block begins in it, and the columns of it from there.
+    columns: Vec<(u32, [u16; EDGE * EDGE + 1])>,
 }
 
 impl Blocks {
@@ -42,21 +46,50 @@ impl Blocks {
     pub fn new(surfaces: &Surfaces) -> Self {
         let [width, height] = [surfaces.view.size.0 as usize, surfaces.view.size.1 as usize];
         let across = width.div_ceil(EDGE);
-        let block = |(events, i): (&mut Vec<Event>, usize)| {
-            let [x, y] = [i % across * EDGE, i / across * EDGE];
-            let columns = || {
-                let xs = x..(x + EDGE).min(width);
-                (y..(y + EDGE).min(height))
-                    .flat_map(move |y| xs.clone().map(move |x| y * width + x))
-            };
-            Block::new(surfaces, columns, events)
+        let down = height.div_ceil(EDGE);
+        // The blocks side by side hold what the rows of the picture that they cover do.
+        let mut nearness = vec![0.0; surfaces.nearness.len()];
+        let first = |row: usize| 2 * surfaces.starts[(row * EDGE).min(height) * width] as usize;
+        let mut parts = Vec::with_capacity(down);
+        let mut rest = &mut nearness[..];
+        for row in 0..down {
+            let (part, behind) = rest.split_at_mut(first(row + 1) - first(row));
+            parts.push(part);
+            rest = behind;
+        }
+        let row = |(row, part): (usize, &mut [f32])| {
+            let (mut events, mut at) = (Vec::new(), 0);
+            let mut blocks = Vec::with_capacity(across);
+            for x in (0..width).step_by(EDGE) {
+                let mut columns = [0_u16; EDGE * EDGE + 1];
+                let (begin, mut count) = (at, 0);
+                for i in 0..EDGE * EDGE {
+                    let [x, y] = [x + i % EDGE, row * EDGE + i / EDGE];
+                    if x < width && y < height {
+                        let of = &surfaces.nearness[surfaces.of(y * width + x)];
+                        part[at..at + of.len()].copy_from_slice(of);
+                        at += of.len();
+                        count += 1;
+                    }
+                    columns[i + 1] = (at - begin) as u16;
+                }
+                let block = Block::new((&part[begin..at], &columns), count, &mut events);
+                blocks.push((block, ((first(row) + begin) as u32, columns)));
+            }
+            blocks
         };
-        let blocks = (0..across * height.div_ceil(EDGE))
-            .into_par_iter()
-            .with_min_len(across)
-            .map_init(Vec::new, |events, i| block((events, i)))
-            .collect();
-        Self { blocks, across }
+        let made: Vec<_> = parts.into_par_iter().enumerate().map(row).collect();
+        let (blocks, columns) = made.into_iter().flatten().unzip();
+        Self { blocks, across, nearness, columns }
+    }
+
+    /// The nearness of the surfaces of the column (x, y).
+    #[inline]
+    pub(crate) fn column(&self, [x, y]: [usize; 2]) -> &[f32] {
+        let (first, columns) = &self.columns[y / EDGE * self.across + x / EDGE];
+        let i = y % EDGE * EDGE + x % EDGE;
+        &self.nearness
+            [*first as usize + columns[i] as usize..*first as usize + columns[i + 1] as usize]
     }
 
     /// Whether a ray that is `inside` or not meets nothing in the block at (x, y), in blocks, between two
@@ -82,20 +115,13 @@ struct Event {
 }
 
 impl Block {
-    fn new<C: Iterator<Item = usize>>(
-        surfaces: &Surfaces,
-        columns: impl Fn() -> C,
-        events: &mut Vec<Event>,
-    ) -> Self {
+    /// The bands of `all` columns with these surfaces.
+    fn new((nearness, columns): (&[f32], &[u16]), all: usize, events: &mut Vec<Event>) -> Self {
         events.clear();
-        let mut all = 0;
-        for column in columns() {
-            all += 1;
-            events.extend(
-                surfaces
-                    .of(column)
-                    .map(|s| Event { nearness: surfaces.nearness[s], enters: s % 2 == 0 }),
-            );
+        for column in columns.windows(2) {
+            let of = &nearness[column[0] as usize..column[1] as usize];
+            let event = |(i, n): (usize, &f32)| Event { nearness: *n, enters: i % 2 == 0 };
+            events.extend(of.iter().enumerate().map(event));
         }
         events.sort_unstable_by(|a, b| b.nearness.total_cmp(&a.nearness));
         let mut block = Self::default();

@@ -46,6 +46,8 @@ pub struct Hit {
 pub(crate) struct Line {
     start: [f32; 3],
     change: [f32; 3],
+    /// What the way along the line grows by over a pixel, for both axes of the picture.
+    per_pixel: [f32; 2],
 }
 
 /// Lines shorter than this many pixels stay in their column.
@@ -78,7 +80,10 @@ impl Line {
         }
         let (start, end) = (on_picture(p), on_picture(p + d * reach));
         let finite = start.iter().chain(&end).all(|x| x.is_finite());
-        finite.then(|| Self { start, change: [0, 1, 2].map(|i| end[i] - start[i]) })
+        finite.then(|| {
+            let change = [0, 1, 2].map(|i| end[i] - start[i]);
+            Self { start, change, per_pixel: [0, 1].map(|i| 1.0 / change[i]) }
+        })
     }
 
     #[inline]
@@ -92,39 +97,69 @@ impl Line {
         if self.change[axis].abs() < SHORT {
             return f32::INFINITY;
         }
-        (place - self.start[axis]) / self.change[axis]
+        (place - self.start[axis]) * self.per_pixel[axis]
+    }
+}
+
+/// Where the surfaces of a column are looked up.
+trait Columns {
+    /// The nearness of the surfaces of the column (x, y).
+    fn column(&self, pixel: [usize; 2]) -> &[f32];
+    /// Blocks to skip.
+    fn blocks(&self) -> Option<&Blocks>;
+}
+
+impl Columns for Surfaces {
+    #[inline]
+    fn column(&self, [x, y]: [usize; 2]) -> &[f32] {
+        &self.nearness[self.of(y * self.view.size.0 as usize + x)]
+    }
+
+    fn blocks(&self) -> Option<&Blocks> {
+        None
+    }
+}
+
+impl Columns for Blocks {
+    #[inline]
+    fn column(&self, pixel: [usize; 2]) -> &[f32] {
+        self.column(pixel)
+    }
+
+    fn blocks(&self) -> Option<&Blocks> {
+        Some(self)
     }
 }
 
 /// The first surface that `ray` meets, and the number of columns it went through.
 pub fn march(surfaces: &Surfaces, ray: &Ray) -> (Option<Hit>, u32) {
-    march_over(surfaces, ray, None)
+    march_over((surfaces, surfaces), ray)
 }
 
 /// As [`march`], with the same result, over the columns that cannot be skipped.
 pub fn march_blocks((surfaces, blocks): (&Surfaces, &Blocks), ray: &Ray) -> (Option<Hit>, u32) {
-    march_over(surfaces, ray, Some(blocks))
+    march_over((surfaces, blocks), ray)
 }
 
-fn march_over(surfaces: &Surfaces, ray: &Ray, blocks: Option<&Blocks>) -> (Option<Hit>, u32) {
+fn march_over<C: Columns>((surfaces, columns): (&Surfaces, &C), ray: &Ray) -> (Option<Hit>, u32) {
     let Some(line) = Line::new(surfaces, ray) else { return (None, 0) };
     let size = [surfaces.view.size.0 as i32, surfaces.view.size.1 as i32];
     let at = [line.start[0].floor() as i32, line.start[1].floor() as i32];
     // A start on the wall between two columns may be rounded to the other one.
     let mut pixel = [0, 1].map(|i| at[i].clamp(0, size[i] - 1));
     let step = [0, 1].map(|i| if line.change[i] > 0.0 { 1 } else { -1 });
-    let mut walk = Walk { surfaces, ray, line, before: None };
-    let (mut u, mut columns, mut tried) = (0.0_f32, 0, None);
+    let mut walk = Walk { surfaces, columns, ray, line, before: None };
+    let (mut u, mut count, mut tried) = (0.0_f32, 0, [-1; 2]);
     loop {
-        if let Some(blocks) = blocks.filter(|_| columns > 0) {
+        if let Some(blocks) = columns.blocks().filter(|_| count > 0) {
             let block = pixel.map(|p| p / EDGE as i32);
-            if tried != Some(block) {
-                tried = Some(block);
+            if tried != block {
+                tried = block;
                 match line.skip((blocks, ray.inside), (pixel, u), size) {
                     Skip::Not => {}
-                    Skip::Out => return (None, columns),
+                    Skip::Out => return (None, count),
                     Skip::To { last, next, at } => {
-                        walk.before = Some((last[1] * size[0] + last[0]) as usize);
+                        walk.before = Some(last);
                         (pixel, u) = (next, at);
                         continue;
                     }
@@ -134,14 +169,13 @@ fn march_over(surfaces: &Surfaces, ray: &Ray, blocks: Option<&Blocks>) -> (Optio
         let next = [0, 1].map(|i| line.reaches(i, (pixel[i] + step[i].max(0)) as f32));
         let axis = usize::from(next[1] < next[0]);
         let end = next[axis].clamp(u, 1.0);
-        let column = (pixel[1] * size[0] + pixel[0]) as usize;
-        columns += 1;
-        if let Some(hit) = walk.column(column, [u, end], columns == 1) {
-            return (Some(hit), columns);
+        count += 1;
+        if let Some(hit) = walk.column(pixel, [u, end], count == 1) {
+            return (Some(hit), count);
         }
         pixel[axis] += step[axis];
         if next[axis] >= 1.0 || pixel[axis] < 0 || pixel[axis] >= size[axis] {
-            return (None, columns);
+            return (None, count);
         }
         u = end;
     }
@@ -201,28 +235,36 @@ impl Line {
     }
 }
 
-struct Walk<'a> {
+struct Walk<'a, C> {
     surfaces: &'a Surfaces,
+    columns: &'a C,
     ray: &'a Ray,
     line: Line,
     /// The last column.
-    before: Option<usize>,
+    before: Option<[i32; 2]>,
 }
 
-impl Walk<'_> {
+impl<C: Columns> Walk<'_, C> {
     /// What is met in a column, between two places of the line.
     #[inline]
-    fn column(&mut self, column: usize, [from, to]: [f32; 2], first: bool) -> Option<Hit> {
-        let of = self.surfaces.of(column);
-        let list = &self.surfaces.nearness[of.clone()];
+    fn column(&mut self, pixel: [i32; 2], [from, to]: [f32; 2], first: bool) -> Option<Hit> {
+        let list = self.columns.column(pixel.map(|p| p as usize));
+        let before = self.before.replace(pixel);
+        if list.is_empty() && !self.ray.inside {
+            return None;
+        }
         let [q, end] = [from, to].map(|u| self.line.start[2] + self.line.change[2] * u);
         // How many surfaces lie before the ray's place: inside, if they are odd.
         let mut count = list.iter().take_while(|n| **n > q).count();
-        if let Some(own) = self.ray.from.filter(|own| first && of.contains(own)) {
+        let own = self.ray.from.filter(|_| first).and_then(|own| {
+            let of = self.surfaces.of(self.index(pixel));
+            of.contains(&own).then(|| own - of.start)
+        });
+        if let Some(own) = own {
             // Of its own surface the ray is on the side that it goes to.
-            count = own - of.start + usize::from(end < q);
+            count = own + usize::from(end < q);
         } else if !first && (count % 2 == 1) != self.ray.inside {
-            let hit = self.wall(of.start, (list, count), from);
+            let hit = self.wall(pixel, (list, count), (before, from));
             if hit.is_some() {
                 return hit;
             }
@@ -232,31 +274,38 @@ impl Walk<'_> {
             let next = if away { Some(count) } else { count.checked_sub(1) };
             let Some(next) = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))
             else {
-                break;
+                return None;
             };
             count = if away { count + 1 } else { count - 1 };
             if (count % 2 == 1) != self.ray.inside {
                 let u = (list[next] - self.line.start[2]) / self.line.change[2];
-                let hit = self.hit(of.start + next, u);
+                let hit = self.hit(self.surfaces.of(self.index(pixel)).start + next, u);
                 if hit.is_some() {
                     return hit;
                 }
             }
         }
-        self.before = Some(column);
-        None
+    }
+
+    fn index(&self, pixel: [i32; 2]) -> usize {
+        pixel[1] as usize * self.surfaces.view.size.0 as usize + pixel[0] as usize
     }
 
     /// The wall of a column that is met at `u`: with the normal of the nearest surface in this column or
-    /// the last.
-    fn wall(&self, first: usize, (list, count): (&[f32], usize), u: f32) -> Option<Hit> {
+    /// the one before.
+    fn wall(
+        &self,
+        pixel: [i32; 2],
+        (list, count): (&[f32], usize),
+        (before, u): (Option<[i32; 2]>, f32),
+    ) -> Option<Hit> {
         let q = self.line.start[2] + self.line.change[2] * u;
-        let here = nearest(list, count, q).map(|i| first + i);
-        let there = self.before.and_then(|column| {
-            let of = self.surfaces.of(column);
-            let list = &self.surfaces.nearness[of.clone()];
+        let first = |pixel| self.surfaces.of(self.index(pixel)).start;
+        let here = nearest(list, count, q).map(|i| first(pixel) + i);
+        let there = before.and_then(|pixel| {
+            let list = self.columns.column(pixel.map(|p| p as usize));
             let count = list.iter().take_while(|n| **n > q).count();
-            nearest(list, count, q).map(|i| of.start + i)
+            nearest(list, count, q).map(|i| first(pixel) + i)
         });
         here.into_iter().chain(there).find_map(|surface| self.hit(surface, u))
     }

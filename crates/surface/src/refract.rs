@@ -6,12 +6,15 @@
 //! boundaries if it leaves the liquid, and else goes with the rest.
 
 use glam::{Vec3, Vec4};
-use motes_scene::optics;
+use motes_scene::{Sight, optics};
 
 use crate::Surfaces;
 use crate::blocks::Blocks;
 use crate::march::{Hit, Ray, march, march_blocks};
 use crate::shade::{Around, Optics, Pixel};
+
+/// How much wider cones of neighbouring paths become at a boundary, per unit of length.
+const PART: f32 = 0.02;
 
 /// What paths go through.
 pub(crate) struct Paths<'a> {
@@ -29,7 +32,7 @@ impl Paths<'_> {
         let point = self.surfaces.view.point([x, y], self.surfaces.nearness[first]);
         let to_eye = point.distance(pixel.origin);
         // What stands before the liquid.
-        if let Some((light, _)) = self.around.meet(pixel.origin, pixel.direction, to_eye) {
+        if let Some((light, _)) = self.around.meet(&Sight { reach: to_eye, ..pixel.sight() }) {
             return light.extend(1.0);
         }
         let ray =
@@ -74,10 +77,21 @@ impl Paths<'_> {
     /// The light along a path.
     fn follow(&self, mut ray: Ray, mut absorption: Vec3) -> Vec3 {
         let (mut light, mut weight) = (Vec3::ZERO, Vec3::ONE);
+        // Neighbouring paths part at every boundary.
+        let (mut width, mut spread) = (0.0, PART);
+        let sight = |origin, direction, width, spread| Sight {
+            origin,
+            direction,
+            reach: f32::INFINITY,
+            width,
+            spread,
+        };
         for boundary in 0..=self.optics.depth {
             let hit = self.march(&ray);
             let reach = hit.map_or(f32::INFINITY, |h| h.distance);
-            let met = self.around.meet(ray.origin, ray.direction, reach);
+            let met = self
+                .around
+                .meet(&Sight { reach, ..sight(ray.origin, ray.direction, width, spread) });
             let Some(hit) = hit.filter(|_| met.is_none()) else {
                 let (seen, distance) = met.unwrap_or((Vec3::ZERO, 0.0));
                 // Where the picture ends, the liquid does.
@@ -87,12 +101,15 @@ impl Paths<'_> {
             if ray.inside {
                 weight *= optics::transmitted(absorption, hit.distance);
             }
+            width += spread * hit.distance;
+            spread += PART;
             let ior = self.optics.ior;
             let eta = if ray.inside { ior } else { 1.0 / ior };
             let split = optics::split(ray.direction, hit.normal, eta);
             if boundary == self.optics.depth {
                 let on = split.refracted.unwrap_or(ray.direction);
-                return light + weight * self.around.background(hit.point, on);
+                return light
+                    + weight * self.around.background(&sight(hit.point, on, width, spread));
             }
             let (through, thrown) = (split.refracted, split.reflectance);
             let goes_on = through.filter(|_| thrown < 0.5);
@@ -104,7 +121,8 @@ impl Paths<'_> {
             let other = if goes_on.is_some() { Some(split.reflected) } else { through };
             if let Some(other) = other.filter(|_| inside) {
                 let part = if goes_on.is_some() { thrown } else { 1.0 - thrown };
-                light += weight * part * self.around.background(hit.point, other);
+                let seen = self.around.background(&sight(hit.point, other, width, spread));
+                light += weight * part * seen;
                 weight *= 1.0 - part;
             }
             if inside && !ray.inside {

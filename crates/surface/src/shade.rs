@@ -5,7 +5,7 @@
 //! *refractive* follows the light, see `refract.rs`.
 
 use glam::{Vec3, Vec4};
-use motes_scene::{Beyond, Lights, optics};
+use motes_scene::{Beyond, Lights, Sight, optics};
 use rayon::prelude::*;
 
 use crate::occlusion::Occlusion;
@@ -78,18 +78,19 @@ impl Around<'_> {
     }
 
     /// What comes from outside along a ray, in shadow where the liquid casts one.
-    pub(crate) fn meet(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)> {
-        let (light, distance) = self.beyond.meet(origin, direction, reach)?;
+    pub(crate) fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)> {
+        let (light, distance) = self.beyond.meet(sight)?;
         let lit = match self.shadow.filter(|_| distance.is_finite()) {
-            Some(shadow) => shadow.fill_and_key(origin + direction * distance),
+            Some(shadow) => shadow.fill_and_key(sight.origin + sight.direction * distance),
             None => Vec3::ONE,
         };
         Some((light * lit, distance))
     }
 
     /// The light from the surroundings, wherever they are.
-    pub(crate) fn background(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        self.meet(origin, direction, f32::INFINITY).map_or(Vec3::ZERO, |(light, _)| light)
+    pub(crate) fn background(&self, sight: &Sight) -> Vec3 {
+        let whole = Sight { reach: f32::INFINITY, ..*sight };
+        self.meet(&whole).map_or(Vec3::ZERO, |(light, _)| light)
     }
 }
 
@@ -103,7 +104,8 @@ pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[
     color.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, color) in row.iter_mut().enumerate() {
             let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
-            let pixel = Pixel { index: y * width + x, place: [x, y], origin, direction };
+            let spread = surfaces.view.rays.pixel;
+            let pixel = Pixel { index: y * width + x, place: [x, y], origin, direction, spread };
             *color = match (surfaces.of(pixel.index).is_empty(), optics.mode) {
                 (true, _) => nothing(&pixel, around),
                 (_, Mode::Front) => front(surfaces, &pixel, around),
@@ -122,11 +124,21 @@ pub(crate) struct Pixel {
     pub place: [usize; 2],
     pub origin: Vec3,
     pub direction: Vec3,
+    /// Size of a pixel: at distance 1 in perspective, which serves for orthographic projection, too.
+    pub spread: f32,
+}
+
+impl Pixel {
+    /// The ray through the pixel's centre.
+    pub fn sight(&self) -> Sight {
+        let Self { origin, direction, spread, .. } = *self;
+        Sight { origin, direction, reach: f32::INFINITY, width: 0.0, spread }
+    }
 }
 
 fn nothing(pixel: &Pixel, around: &Around<'_>) -> Vec4 {
     match around.shown {
-        true => around.background(pixel.origin, pixel.direction).extend(1.0),
+        true => around.background(&pixel.sight()).extend(1.0),
         // The floor and other things are not the background.
         false => Vec4::ZERO,
     }
@@ -158,7 +170,8 @@ fn mirrored(
     let split = optics::split(pixel.direction, normal, 1.0 / optics.ior);
     let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
     let point = surfaces.view.point([x, y], surfaces.nearness[first]);
-    (around.background(point, split.reflected), split.reflectance)
+    let sight = Sight { origin: point, direction: split.reflected, ..pixel.sight() };
+    (around.background(&sight), split.reflectance)
 }
 
 fn front(surfaces: &Surfaces, pixel: &Pixel, around: &Around<'_>) -> Vec4 {
@@ -196,7 +209,7 @@ fn translucent(
     let mut alpha = 1.0;
     match around.shown {
         true => {
-            let beyond = around.background(pixel.origin, pixel.direction);
+            let beyond = around.background(&pixel.sight());
             color += left * (1.0 - reflectance) * beyond;
         }
         false => alpha = 1.0 - left.element_sum() / 3.0 * (1.0 - reflectance),

@@ -1,7 +1,7 @@
 //! Rays through the liquid: against the exact ball lens, and with blocks against without.
 
 use glam::{DVec3, Vec3};
-use motes_scene::{Beyond, Lights, Projection, Rays, Scene, optics};
+use motes_scene::{Beyond, Lights, Projection, Rays, Scene, Sight, optics};
 use motes_surface::march::{Ray, march, march_blocks};
 use motes_surface::reference::{Sphere, voxelize};
 use motes_surface::{Around, Blocks, Mode, Optics, Smoothing, Surfaces, View, shade};
@@ -19,8 +19,8 @@ impl Hues {
 }
 
 impl Beyond for Hues {
-    fn meet(&self, _: Vec3, direction: Vec3, reach: f32) -> Option<(Vec3, f32)> {
-        (reach == f32::INFINITY).then(|| (Self::light(direction), reach))
+    fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)> {
+        (sight.reach == f32::INFINITY).then(|| (Self::light(sight.direction), sight.reach))
     }
 }
 
