@@ -180,9 +180,17 @@ impl Columns for BitColumns<'_> {
     }
 
     #[inline(always)]
-    fn holds<S: Simd>(&self, _: S, _: usize, _: f32, _: f32) -> bool {
-        false
+    fn put_core<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>) {
+        self.put(simd, block, new, 0);
     }
+
+    fn settle(&mut self) {}
+
+    #[inline(always)]
+    fn end<S: Simd>(&mut self, _: S) {}
+
+    #[inline(always)]
+    fn reach<S: Simd>(&mut self, _: S, _: usize, _: f32) {}
 
     #[inline(always)]
     fn put<S: Simd>(&mut self, _: S, block: usize, new: &Stretch<S>, _: u32) {
