@@ -268,7 +268,8 @@ impl Liquid<'_> {
                 let lowest =
                     bounds.corners().iter().map(|c| c.dot(up)).fold(f64::INFINITY, f64::min);
                 let center = bounds.center();
-                let point = center + up * (lowest - center.dot(up) - 0.002 * across) - self.origin;
+                // Balls are larger than particles: what lies on the floor wets it.
+                let point = center + up * (lowest - center.dot(up)) - self.origin;
                 let floor = Floor {
                     point: point.as_vec3(),
                     up: up.as_vec3(),

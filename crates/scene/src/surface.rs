@@ -13,7 +13,7 @@ settings! {
         /// front (its first surface, opaque), translucent (light goes straight through) or refractive (light is bent and mirrored).
         mode: Mode = Mode::Refractive,
         /// Radius of the balls that the liquid is made of, in radii of its particles.
-        ball: f64 = 1.7,
+        ball: f64 = 2.0,
         /// The longest empty stretch of a ray that is no gap, in world units; none: 5 radii.
         gap: Option<f64> = None => "0.1",
         /// How far the surface is smoothed, as a standard deviation in world units; 0: not at all; none: 2 radii.

@@ -16,6 +16,9 @@ use crate::shade::{Around, Optics, Pixel};
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
 const PART: f32 = 0.02;
 
+/// Paths that are less than this part of a pixel's light meet nothing but the surroundings.
+const FAINT: f32 = 0.03;
+
 /// What paths go through.
 pub(crate) struct Paths<'a> {
     pub surfaces: &'a Surfaces,
@@ -47,10 +50,11 @@ impl Paths<'_> {
         let mut light = Vec3::ZERO;
         if split.reflectance > 0.0 {
             let reflected = Ray { direction: split.reflected, inside: false, ..ray };
-            light += split.reflectance * self.follow(reflected, tint);
+            light += split.reflectance * self.follow_part(reflected, (tint, split.reflectance));
         }
         if let Some(direction) = split.refracted {
-            light += (1.0 - split.reflectance) * self.follow(Ray { direction, ..ray }, tint);
+            let part = 1.0 - split.reflectance;
+            light += part * self.follow_part(Ray { direction, ..ray }, (tint, part));
         }
         light.extend(1.0)
     }
@@ -72,6 +76,22 @@ impl Paths<'_> {
             Some(blocks) => march_blocks((self.surfaces, blocks), ray).0,
             None => march(self.surfaces, ray).0,
         }
+    }
+
+    /// The light along a path that is a `part` of a pixel's: of a faint one, that of the surroundings.
+    fn follow_part(&self, ray: Ray, (absorption, part): (Vec3, f32)) -> Vec3 {
+        if part < FAINT && !ray.inside {
+            let reach = f32::INFINITY;
+            let Ray { origin, direction, .. } = ray;
+            return self.around.background(&Sight {
+                origin,
+                direction,
+                reach,
+                width: 0.0,
+                spread: PART,
+            });
+        }
+        self.follow(ray, absorption)
     }
 
     /// The light along a path.

@@ -1,0 +1,115 @@
+//! Particles as a liquid, through the front door.
+
+use motes::{Layers, Picture, Quiet, Scene, Session};
+use motes_frame::Values;
+
+fn render(assignments: &[&str], threads: usize) -> Picture {
+    let mut scene = Scene::default();
+    scene.set_sources(&["demo:dam:2e4".into()]);
+    let common = ["renderer=surface", "image.width=160", "image.height=120", "image.samples=1"];
+    for assignment in common.iter().chain(assignments) {
+        scene.set_text(assignment).unwrap();
+    }
+    let mut session = Session::open(scene, Some(threads)).unwrap();
+    session.render(0, Layers::Yes, &Quiet).unwrap()
+}
+
+/// The values of a layer of numbers.
+fn numbers(picture: &Picture, name: &str) -> Vec<f64> {
+    let (_, values) = picture.raw.named_values().find(|(n, _)| *n == name).unwrap();
+    match values {
+        Values::F32(v) => v.iter().map(|v| f64::from(*v)).collect(),
+        Values::U32(v) => v.iter().map(|v| f64::from(*v)).collect(),
+        Values::I64(v) => v.iter().map(|v| *v as f64).collect(),
+        _ => panic!("{name} is not a layer of numbers"),
+    }
+}
+
+#[test]
+fn the_picture_is_the_same_however_it_is_made() {
+    for mode in ["surface.mode=front", "surface.mode=translucent", "surface.mode=refractive"] {
+        let expected = render(&[mode], 1).raw;
+        for (other, threads) in
+            [("surface.skip=true", 2), ("surface.skip=false", 3), ("surface.tile=20", 2)]
+        {
+            assert!(render(&[mode, other], threads).raw == expected, "{mode} {other} {threads}");
+        }
+    }
+}
+
+#[test]
+fn layers_agree_with_each_other() {
+    let picture = render(&[], 2);
+    let (depth, id) = (numbers(&picture, "depth"), numbers(&picture, "id"));
+    let (count, thickness) = (numbers(&picture, "span_count"), numbers(&picture, "thickness"));
+    let mut seen = 0;
+    for i in 0..depth.len() {
+        let liquid = depth[i].is_finite();
+        assert_eq!((count[i] > 0.0, thickness[i] > 0.0), (liquid, liquid), "pixel {i}");
+        assert!(id[i] < 2e4 && (liquid || id[i] == -1.0), "pixel {i}: {}", id[i]);
+        seen += usize::from(liquid);
+    }
+    assert!(seen > depth.len() / 10, "{seen}");
+}
+
+#[test]
+fn without_gap_and_smoothing_it_is_the_spheres() {
+    let still = ["surface.smoothing=0", "surface.gap=0", "surface.ball=1", "surface.cull=off"];
+    let surface = render(&still, 2);
+    let spheres = render(&[&still[..], &["renderer=spheres", "light.preset=flat"]].concat(), 2);
+    let (a, b) = (numbers(&surface, "depth"), numbers(&spheres, "depth"));
+    let (ids_a, ids_b) = (numbers(&surface, "id"), numbers(&spheres, "id"));
+    let mut hits = 0;
+    for i in 0..a.len() {
+        // At the edge of a ball rounding decides whether the ray meets it.
+        if a[i].is_finite() != b[i].is_finite() || (a[i] - b[i]).abs() > 1e-4 {
+            continue;
+        }
+        hits += usize::from(a[i].is_finite() && ids_a[i] == ids_b[i]);
+    }
+    let all = b.iter().filter(|d| d.is_finite()).count();
+    assert!(hits * 1000 > all * 995, "{hits} of {all}");
+}
+
+#[test]
+fn smooth_liquid_has_smooth_normals() {
+    let rough = |picture: &Picture| {
+        let normals = picture.raw.normal().unwrap();
+        let depth = picture.raw.depth().unwrap();
+        let (mut sum, mut count) = (0.0, 0);
+        // The side that faces the eye, beneath the spray.
+        for y in 80..95 {
+            for x in 60..90 {
+                let [a, b] = [y * 160 + x, y * 160 + x + 1].map(|i| normals[i]);
+                if depth[y * 160 + x].is_finite() {
+                    sum += (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>();
+                    count += 1;
+                }
+            }
+        }
+        sum / f64::from(count)
+    };
+    let [plain, smooth] =
+        ["surface.smoothing=0", "surface.filter=recursive"].map(|s| rough(&render(&[s], 2)));
+    // What is left is the shape of the waves.
+    assert!(smooth < 0.2 * plain, "{plain} {smooth}");
+}
+
+#[test]
+fn nothing_visible_is_no_liquid() {
+    let picture = render(&["system.where='Position.X > 9'"], 1);
+    assert!(numbers(&picture, "depth").iter().all(|d| d.is_infinite()));
+}
+
+#[test]
+fn a_panorama_that_is_none_is_an_error() {
+    let mut scene = Scene::default();
+    scene.set_sources(&["demo:dam:1000".into()]);
+    for assignment in
+        ["renderer=surface", "image.width=8", "image.height=8", "surface.environment=none.hdr"]
+    {
+        scene.set_text(assignment).unwrap();
+    }
+    let error = Session::open(scene, Some(1)).unwrap().render(0, Layers::No, &Quiet).unwrap_err();
+    assert!(error.to_string().contains("none.hdr"), "{error}");
+}
