@@ -16,6 +16,8 @@
 //! the next, as what lies there before something else is not smeared over it. What is no thicker than a ball,
 //! a drop, stays round; from there on smoothing sets in with thickness.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::connect::{Links, PRECEDING, Side, rows_mut};
@@ -114,55 +116,73 @@ impl Scale {
     }
 }
 
+/// What the sweeps go over: columns, links, and the recursion's factor for each surface.
+struct Net<'a> {
+    spans: &'a Spans,
+    links: &'a [Links],
+    factors: Vec<f32>,
+    scale: &'a Scale,
+}
+
 /// Smooths `values`, the [`nearness`] of each surface, along `links`.
 pub fn smooth(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale) {
+    let mut factors = vec![0.0; values.len()];
+    // Spans of one column are pairs of values.
+    let pieces = factors.par_chunks_mut(1 << 14).zip(values.par_chunks(1 << 14));
+    pieces.for_each(|(factors, values)| {
+        for (factors, span) in factors.chunks_exact_mut(2).zip(values.chunks_exact(2)) {
+            factors[0] = scale.factor(span[0], span[1]);
+            factors[1] = scale.factor(span[1], span[0]);
+        }
+    });
+    let net = Net { spans, links, factors, scale };
     for _ in 0..ROUNDS {
-        sweep_rows(values, (spans, links), scale);
-        sweep_columns(values, (spans, links), scale);
+        sweep_rows(values, &net);
+        sweep_columns(values, &net);
     }
 }
 
-fn sweep_rows(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale) {
-    let width = spans.size.0 as usize;
-    rows_mut(values, spans).into_par_iter().enumerate().for_each(|(y, row)| {
-        let starts = &spans.starts[y * width..=(y + 1) * width];
+fn sweep_rows(values: &mut [f32], net: &Net<'_>) {
+    let (width, scale) = (net.spans.size.0 as usize, net.scale);
+    rows_mut(values, net.spans).into_par_iter().enumerate().for_each(|(y, row)| {
+        let starts = &net.spans.starts[y * width..=(y + 1) * width];
         let first = starts[0] as usize;
-        let links = &links[2 * first..2 * starts[width] as usize];
-        let column =
-            |x: usize| [2 * (starts[x] as usize - first), 2 * (starts[x + 1] as usize - first)];
+        let all = 2 * first..2 * starts[width] as usize;
+        let (links, factors) = (&net.links[all.clone()], &net.factors[all]);
+        let column = |x: usize| 2 * (starts[x] as usize - first);
         for x in 1..width {
-            let [from, to] = column(x);
-            let before = column(x - 1)[0];
-            for i in from..to {
+            let before = column(x - 1);
+            for i in column(x)..column(x + 1) {
                 let link = links[i][Side::Left as usize];
                 if link < PRECEDING {
-                    row[i] = drawn([row[i], row[i ^ 1]], row[before + link as usize], scale);
+                    row[i] = drawn(row[i], row[before + link as usize], (factors[i], scale));
                 }
             }
         }
         for x in (0..width.saturating_sub(1)).rev() {
-            let [from, to] = column(x);
-            for i in from..to {
+            let behind = column(x + 1);
+            for i in column(x)..behind {
                 let link = links[i][Side::Right as usize];
                 if link < PRECEDING {
-                    row[i] = drawn([row[i], row[i ^ 1]], row[to + link as usize], scale);
+                    row[i] = drawn(row[i], row[behind + link as usize], (factors[i], scale));
                 }
             }
         }
     });
 }
 
-/// The value `own` of a surface, at the other end of whose span is `other`, drawn towards the one before it.
+/// The value `own` of a surface drawn towards the one before it.
 #[inline]
-fn drawn([own, other]: [f32; 2], before: f32, scale: &Scale) -> f32 {
+fn drawn(own: f32, before: f32, (factor, scale): (f32, &Scale)) -> f32 {
     let difference = before - own;
     if difference.abs() > scale.leap(own) {
         return own;
     }
-    own + scale.factor(own, other) * difference
+    own + factor * difference
 }
 
-fn sweep_columns(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale) {
+fn sweep_columns(values: &mut [f32], net: &Net<'_>) {
+    let spans = net.spans;
     let [width, height] = [spans.size.0 as usize, spans.size.1 as usize];
     let strips = width.div_ceil(STRIP);
     // Each strip's part of each row.
@@ -178,35 +198,36 @@ fn sweep_columns(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: 
     }
     parts.into_par_iter().enumerate().for_each(|(s, mut part)| {
         let columns = s * STRIP..((s + 1) * STRIP).min(width);
-        let at = |y: usize| y * width + columns.start..=y * width + columns.end;
+        let at = |y: usize| y * width + columns.start..y * width + columns.end;
         for y in 1..height {
             let (above, rows) = part.split_at_mut(y);
-            let (from, to) = (&spans.starts[at(y - 1)], &spans.starts[at(y)]);
-            let row = (&mut *rows[0], to, &links[2 * to[0] as usize..]);
-            sweep_row(row, (&*above[y - 1], from), (Side::Up, scale));
+            sweep_row((&mut *rows[0], at(y)), (&*above[y - 1], at(y - 1)), (Side::Up, net));
         }
         for y in (0..height.saturating_sub(1)).rev() {
             let (rows, below) = part.split_at_mut(y + 1);
-            let (from, to) = (&spans.starts[at(y + 1)], &spans.starts[at(y)]);
-            let row = (&mut *rows[y], to, &links[2 * to[0] as usize..]);
-            sweep_row(row, (&*below[0], from), (Side::Down, scale));
+            sweep_row((&mut *rows[y], at(y)), (&*below[0], at(y + 1)), (Side::Down, net));
         }
     });
 }
 
-/// One row of a strip (its values, starts and links), drawn towards the row before it.
+/// One row of a strip, its values and pixels, drawn towards the row before it.
 fn sweep_row(
-    (row, starts, links): (&mut [f32], &[u32], &[Links]),
-    (before, starts_before): (&[f32], &[u32]),
-    (side, scale): (Side, &Scale),
+    (row, pixels): (&mut [f32], Range<usize>),
+    (before, pixels_before): (&[f32], Range<usize>),
+    (side, net): (Side, &Net<'_>),
 ) {
-    for x in 0..starts.len() - 1 {
+    let starts = &net.spans.starts[pixels.start..=pixels.end];
+    let starts_before = &net.spans.starts[pixels_before.start..=pixels_before.end];
+    let all = 2 * starts[0] as usize..2 * starts[pixels.len()] as usize;
+    let (links, factors) = (&net.links[all.clone()], &net.factors[all]);
+    for x in 0..pixels.len() {
         let from = 2 * (starts_before[x] - starts_before[0]) as usize;
         for i in 2 * (starts[x] - starts[0])..2 * (starts[x + 1] - starts[0]) {
             let i = i as usize;
             let link = links[i][side as usize];
             if link < PRECEDING {
-                row[i] = drawn([row[i], row[i ^ 1]], before[from + link as usize], scale);
+                let before = before[from + link as usize];
+                row[i] = drawn(row[i], before, (factors[i], net.scale));
             }
         }
     }

@@ -43,20 +43,26 @@ pub fn unpack(word: u32) -> Vec3 {
     Vec3::new(p.x, p.y, z).normalize()
 }
 
-impl Net<'_> {
-    /// Sobel's operator between two sides, the mean of rows `across` weighted 1, 2, 1: the difference per
-    /// pixel.
-    #[inline]
-    fn slope(&self, at: Place, values: &[f32], [ends, across]: [[Side; 2]; 2]) -> f32 {
-        let difference = |p: Place| {
-            let [a, b] = ends.map(|side| self.follow(p, side));
-            let pixels = (b.pixel[0] - a.pixel[0]) + (b.pixel[1] - a.pixel[1]);
-            // At an edge the surface is seen on one side only; where it bends back, on none.
-            if pixels == 0 { 0.0 } else { (values[b.surface] - values[a.surface]) / pixels as f32 }
-        };
-        let beside = across.map(|side| difference(self.follow(at, side)));
-        0.25 * (beside[0] + 2.0 * difference(at) + beside[1])
-    }
+/// Differences of values per pixel along both axes of the picture, by Sobel's operator: each the mean of
+/// three rows weighted 1, 2, 1.
+#[inline]
+fn slopes(net: &Net<'_>, at: Place, values: &[f32]) -> [f32; 2] {
+    let [left, right, up, down] = Side::ALL.map(|side| net.follow(at, side));
+    let difference = |a: Place, b: Place| {
+        let pixels = (b.pixel[0] - a.pixel[0]) + (b.pixel[1] - a.pixel[1]);
+        // At an edge the surface is seen on one side only; where it bends back, on none.
+        match pixels {
+            2 => 0.5 * (values[b.surface] - values[a.surface]),
+            1 => values[b.surface] - values[a.surface],
+            _ => 0.0,
+        }
+    };
+    let across = |p: Place| difference(net.follow(p, Side::Left), net.follow(p, Side::Right));
+    let along = |p: Place| difference(net.follow(p, Side::Up), net.follow(p, Side::Down));
+    [
+        0.25 * (across(up) + 2.0 * difference(left, right) + across(down)),
+        0.25 * (along(left) + 2.0 * difference(up, down) + along(right)),
+    ]
 }
 
 /// The normal of every surface, packed, from its nearness (see [`crate::filter::nearness`]).
@@ -79,13 +85,11 @@ pub fn normals(values: &[f32], (spans, links): (&Spans, &[Links]), view: &View) 
 
 /// The unit normal out of the liquid.
 fn normal(at: Place, (net, values): (&Net<'_>, &[f32]), view: &View) -> Vec3 {
-    const HORIZONTAL: [Side; 2] = [Side::Left, Side::Right];
-    const VERTICAL: [Side; 2] = [Side::Up, Side::Down];
     let rays = &view.rays;
     // b runs upward, rows downward.
-    let by_a = net.slope(at, values, [HORIZONTAL, VERTICAL]) / rays.pixel;
-    let by_b = -net.slope(at, values, [VERTICAL, HORIZONTAL]) / rays.pixel;
-    let along = match rays.projection {
+    let [across, along] = slopes(net, at, values).map(|slope| slope / rays.pixel);
+    let (by_a, by_b) = (across, -along);
+    let ahead = match rays.projection {
         Projection::Perspective => {
             let a = (at.pixel[0] as f32 + 0.5 - rays.center[0]) * rays.pixel;
             let b = (rays.center[1] - at.pixel[1] as f32 - 0.5) * rays.pixel;
@@ -94,7 +98,7 @@ fn normal(at: Place, (net, values): (&Net<'_>, &[f32]), view: &View) -> Vec3 {
         Projection::Orthographic => 1.0,
     };
     // Away from the eye.
-    let ahead = rays.right * by_a + rays.up * by_b + rays.forward * along;
+    let ahead = rays.right * by_a + rays.up * by_b + rays.forward * ahead;
     let ahead = ahead.normalize_or(rays.forward);
     if at.surface % 2 == 1 { ahead } else { -ahead }
 }
