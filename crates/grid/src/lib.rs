@@ -31,5 +31,6 @@ pub use grid::{Block, Grid, Particle, Radii};
 pub use groups::{GROUP_EDGE, Group};
 pub use lattice::Lattice;
 pub use pages::Pages;
+pub use places::{BATCH, Places, Rows, bounds_of_points, of_points};
 pub use ranges::BlockRanges;
 pub use visibility::{Filter, Seen, Visibility};

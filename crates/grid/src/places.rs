@@ -10,11 +10,11 @@ use glam::Vec3;
 use crate::{Block, Lattice, Particle};
 
 /// How many particles the kernels take at once.
-pub(crate) const BATCH: usize = 16;
+pub const BATCH: usize = 16;
 
 /// Equal cubes along three axes, numbered.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Places {
+pub struct Places {
     low: [f32; 3],
     /// Cubes per unit of length.
     scale: f32,
@@ -35,7 +35,8 @@ impl Places {
         Self::new(block.cell_low, block.cell_edge, block.cells)
     }
 
-    fn new(low: Vec3, edge: f32, dims: [u32; 3]) -> Self {
+    /// `dims` cubes along the axes, at least one each, from `low` on with this edge.
+    pub fn new(low: Vec3, edge: f32, dims: [u32; 3]) -> Self {
         let [nx, ny, _] = dims;
         let last = dims.map(|d| d - 1);
         Self { low: low.to_array(), scale: 1.0 / edge, last, stride: [1, nx, nx * ny] }
@@ -68,16 +69,16 @@ impl Places {
 }
 
 /// [`Places`], repeated for points of three numbers that lie side by side.
-pub(crate) struct Rows {
+pub struct Rows {
     low: [f32; 3 * BATCH],
     last: [u32; 3 * BATCH],
     stride: [u32; 3 * BATCH],
     scale: f32,
 }
 
-/// The numbers of the places of sixteen points.
+/// The numbers of the places of sixteen points. Called in a kernel.
 #[inline(always)]
-pub(crate) fn of_points<S: Simd>(simd: S, rows: &Rows, points: &[[f32; 3]]) -> [u32; BATCH] {
+pub fn of_points<S: Simd>(simd: S, rows: &Rows, points: &[[f32; 3]]) -> [u32; BATCH] {
     let points: &[f32] = bytemuck::cast_slice(points);
     let scale = f32x16::splat(simd, rows.scale);
     let mut parts = [0; 3 * BATCH];
@@ -144,7 +145,7 @@ fn along<S: Simd>(simd: S, places: &Places, axis: usize, p: f32x16<S>) -> u32x16
 
 /// Least and greatest coordinates of `points`; `None` if one of them is not finite.
 #[simd]
-pub(crate) fn bounds_of_points<S: Simd>(simd: S, points: &[[f32; 3]]) -> Option<(Vec3, Vec3)> {
+pub fn bounds_of_points<S: Simd>(simd: S, points: &[[f32; 3]]) -> Option<(Vec3, Vec3)> {
     let batches = points.chunks_exact(BATCH);
     let rest = batches.remainder();
     let zero = f32x16::splat(simd, 0.0);

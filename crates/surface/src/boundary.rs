@@ -1,0 +1,162 @@
+//! Boundary extraction (Zirr & Dachsbacher 2015, §3.1): what has to be drawn of a liquid, whatever the
+//! view. These are the spheres that do not lie within inner cells, and the inner cells as cubes.
+
+use fearless_simd::{Level, dispatch, prelude::*};
+use fearless_simd_macros::simd;
+use glam::Vec3;
+use motes_grid::{BATCH, of_points};
+use rayon::prelude::*;
+
+use crate::cull::{Cells, Cube};
+use crate::source::{Gathered, Piece, Source, drawable};
+use crate::{Input, Params};
+
+/// The boundary of a liquid: views can be made of it, one after the other.
+#[derive(Debug)]
+pub struct Boundary {
+    pub(crate) parts: Vec<Part>,
+    pub(crate) cubes: Cubes,
+    /// What was found.
+    pub counts: BoundaryCounts,
+}
+
+/// What was found of a liquid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BoundaryCounts {
+    /// Particles that can be drawn.
+    pub particles: usize,
+    /// Particles that are kept.
+    pub kept: usize,
+    /// Cells of the lattice; 0 if there was none.
+    pub cells: usize,
+    /// Inner cells.
+    pub inner: usize,
+    /// Cubes that they make.
+    pub cubes: usize,
+    /// Bytes of the cells' bits, given back by now.
+    pub cell_bytes: usize,
+    /// Bytes of what is kept.
+    pub bytes: usize,
+}
+
+/// Spheres that are kept of a chunk of particles.
+#[derive(Debug, Default)]
+pub(crate) struct Part {
+    /// Centre and scaled radius.
+    pub spheres: Vec<[f32; 4]>,
+    /// The particle of each; empty if they are not asked for.
+    pub indices: Vec<u32>,
+}
+
+/// The inner cells.
+#[derive(Debug, Default)]
+pub(crate) struct Cubes {
+    /// The corner of the lattice.
+    pub low: Vec3,
+    /// The edge of a cell.
+    pub edge: f32,
+    /// Place and size of each, in cells.
+    pub cubes: Vec<Cube>,
+}
+
+impl Boundary {
+    /// Extracts the boundary of `input`.
+    pub fn extract(input: &Input<'_>, params: &Params, level: Level) -> Self {
+        let source = Source::new(*input);
+        let survey = source.survey(level);
+        let cells = Cells::new(&source, &survey, params, level);
+        let parts: Vec<Part> = (0..source.chunks())
+            .into_par_iter()
+            .map_init(<(Gathered, Part)>::default, |(gathered, part), chunk| {
+                let piece = source.piece(chunk, gathered);
+                let keep =
+                    Keep { cells: cells.as_ref(), scale: input.radius_scale, ids: params.ids };
+                dispatch!(level, simd => keep_part(simd, &keep, &piece, part))
+            })
+            .collect();
+        let mut counts = BoundaryCounts {
+            particles: survey.count,
+            kept: parts.iter().map(|p| p.spheres.len()).sum(),
+            ..BoundaryCounts::default()
+        };
+        let mut cubes = Cubes::default();
+        if let Some(cells) = cells {
+            (counts.cells, counts.inner) = cells.counts();
+            counts.cell_bytes = cells.bytes();
+            cubes = Cubes { low: cells.low, edge: cells.edge, cubes: cells.cubes() };
+        }
+        counts.cubes = cubes.cubes.len();
+        let each = size_of::<[f32; 4]>() + if params.ids { 4 } else { 0 };
+        counts.bytes = counts.kept * each + counts.cubes * size_of::<Cube>();
+        Self { parts, cubes, counts }
+    }
+}
+
+impl Boundary {
+    /// The corner of the lattice of cells and their edge; `None` without any.
+    pub fn lattice(&self) -> Option<(Vec3, f32)> {
+        (self.counts.cells > 0).then_some((self.cubes.low, self.cubes.edge))
+    }
+}
+
+/// Which spheres are kept.
+struct Keep<'a> {
+    cells: Option<&'a Cells>,
+    scale: f32,
+    ids: bool,
+}
+
+impl Keep<'_> {
+    /// Adds a particle in cell `cell` to `spheres[*kept]`, unless it is left out. The number stays then,
+    /// so that what was written is overwritten: there is no branch to guess.
+    #[inline(always)]
+    fn add(&self, piece: &Piece<'_>, (i, cell): (usize, u32), part: &mut Part, kept: &mut usize) {
+        let [x, y, z] = piece.positions[i];
+        let radius = piece.radius(i) * self.scale;
+        let hidden = self.cells.is_some_and(|cells| cells.covers(cell, [x, y, z], radius));
+        // Zero only if all are finite: ∞·0 and NaN·0 are NaN.
+        let drawn = (x + y + z) * 0.0 == 0.0 && drawable(radius);
+        if let Some(place) = part.spheres.get_mut(*kept) {
+            *place = [x, y, z, radius];
+        }
+        if self.ids
+            && let Some(place) = part.indices.get_mut(*kept)
+        {
+            *place = piece.indices.of(i);
+        }
+        *kept += usize::from(drawn && !hidden);
+    }
+}
+
+/// What is kept of a chunk; `memory` is made as large as needed.
+#[simd]
+fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut Part) -> Part {
+    let count = piece.positions.len();
+    if memory.spheres.len() < count {
+        memory.spheres.resize(count, [0.0; 4]);
+        memory.indices.resize(if keep.ids { count } else { 0 }, 0);
+    }
+    let mut kept = 0;
+    let whole = count / BATCH * BATCH;
+    if let Some(cells) = keep.cells {
+        let rows = cells.rows();
+        for at in (0..whole).step_by(BATCH) {
+            let numbers = of_points(simd, &rows, &piece.positions[at..at + BATCH]);
+            for i in 0..BATCH {
+                keep.add(piece, (at + i, numbers[i]), memory, &mut kept);
+            }
+        }
+        for i in whole..count {
+            let cell = cells.cell(piece.positions[i]);
+            keep.add(piece, (i, cell), memory, &mut kept);
+        }
+    } else {
+        for i in 0..count {
+            keep.add(piece, (i, 0), memory, &mut kept);
+        }
+    }
+    Part {
+        spheres: memory.spheres[..kept].to_vec(),
+        indices: memory.indices[..if keep.ids { kept } else { 0 }].to_vec(),
+    }
+}

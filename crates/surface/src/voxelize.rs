@@ -1,0 +1,139 @@
+//! From the boundary of a liquid to the spans of a picture, tile by tile on all cores.
+
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
+use crate::bits::BitColumns;
+use crate::boundary::Boundary;
+use crate::compress::{TileSpans, assemble};
+use crate::intervals::Intervals;
+use crate::items::{Binning, Tiles};
+use crate::layers::Layers;
+use crate::splat::{Columns, Easel, Painter, draw};
+use crate::tile::{Stretch, TileRays};
+use crate::{Marks, Params, Representation, Spans, View};
+
+/// Most bytes of a tile's bits, for each thread.
+const BITS_BYTES: usize = 1 << 24;
+
+/// What was done for a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stats {
+    /// Spheres and cubes, once for each tile they touch.
+    pub items: usize,
+    /// Bytes of the items.
+    pub item_bytes: usize,
+    /// Bytes of the spans before they are put together.
+    pub tile_bytes: usize,
+    /// Bytes of the spans.
+    pub span_bytes: usize,
+    /// Layers of the bit grid; 0 without one.
+    pub layers: usize,
+    /// Thickness of a layer, by its depth in perspective, in world units orthographic.
+    pub layer_step: f32,
+    /// Whether the layers are thicker than the angle asked for, which needed too many.
+    pub coarsened: bool,
+}
+
+/// The spans of all pixels of `view` of a liquid.
+///
+/// `params` is what the boundary was extracted with, but for `gap`, `spans`, `representation` and `tile`,
+/// which may differ. Bits know no particles: with them none are told.
+pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level) -> (Spans, Stats) {
+    let layers = match &params.representation {
+        Representation::Intervals => None,
+        Representation::Bits(bits) => Some((Layers::new(view, bits), bits.marks)),
+    };
+    let most = layers.as_ref().map_or(u32::MAX, |(l, _)| BitColumns::largest_tile(l, BITS_BYTES));
+    let tiles = Tiles::new(view.size, params.tile.min(most));
+    let binning = Binning::new(boundary, view, &tiles, level);
+    let painter = Painter { view, tiles: &tiles, cubes: &boundary.cubes, binning: &binning };
+    let mut stats = Stats { items: binning.len(), item_bytes: binning.bytes(), ..Stats::default() };
+    let parts = match (&layers, params.ids) {
+        (None, false) => exact::<false>(&painter, params, level),
+        (None, true) => exact::<true>(&painter, params, level),
+        (Some(layers), _) => layered(&painter, params, (&layers.0, layers.1), level),
+    };
+    if let Some((layers, _)) = &layers {
+        stats.layers = layers.len();
+        stats.layer_step = layers.step as f32;
+        stats.coarsened = layers.coarsened;
+    }
+    drop(binning);
+    stats.tile_bytes = parts.iter().map(TileSpans::bytes).sum();
+    let spans = assemble(view, &tiles, &parts);
+    stats.span_bytes = spans.bytes();
+    (spans, stats)
+}
+
+/// Columns and the gap they bridge.
+#[derive(Default)]
+struct Exact<const IDS: bool> {
+    columns: Intervals<IDS>,
+    gap: f32,
+}
+
+impl<const IDS: bool> Columns for Exact<IDS> {
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self, simd: S, rays: &TileRays) {
+        self.columns.begin(simd, rays, self.gap);
+    }
+
+    #[inline(always)]
+    fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool {
+        self.columns.holds(simd, block, front, back)
+    }
+
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
+        self.columns.put(simd, block, new, index);
+    }
+}
+
+/// Makes all tiles with intervals.
+fn exact<const IDS: bool>(painter: &Painter<'_>, params: &Params, level: Level) -> Vec<TileSpans> {
+    let most = params.spans.clamp(1, u16::MAX.into()) as usize;
+    let begin =
+        || (Easel::default(), Exact::<IDS> { gap: params.gap.max(0.0), ..Exact::default() });
+    (0..painter.tiles.count())
+        .into_par_iter()
+        .with_max_len(1)
+        .map_init(begin, |(easel, exact), tile| {
+            if !painter.any(tile) {
+                return empty(painter, tile);
+            }
+            dispatch!(level, simd => draw(simd, painter, tile, easel, exact));
+            exact.columns.finish(&easel.rays, painter.view.size.0, most)
+        })
+        .collect()
+}
+
+/// Makes all tiles with bits.
+fn layered(
+    painter: &Painter<'_>,
+    params: &Params,
+    (layers, marks): (&Layers, Marks),
+    level: Level,
+) -> Vec<TileSpans> {
+    let most = params.spans.clamp(1, u16::MAX.into()) as usize;
+    let begin = || (Easel::default(), BitColumns::new(layers, marks, params.gap.max(0.0)));
+    (0..painter.tiles.count())
+        .into_par_iter()
+        .with_max_len(1)
+        .map_init(begin, |(easel, columns), tile| {
+            if !painter.any(tile) {
+                return empty(painter, tile);
+            }
+            dispatch!(level, simd => draw(simd, painter, tile, easel, columns));
+            columns.finish(&easel.rays, painter.view.size.0, most)
+        })
+        .collect()
+}
+
+/// A tile without spans.
+fn empty(painter: &Painter<'_>, tile: usize) -> TileSpans {
+    let mut rays = TileRays::default();
+    rays.turn(painter.view, painter.tiles, tile);
+    let pixels = rays.pixels.0 * rays.pixels.1;
+    TileSpans { counts: vec![0; pixels as usize], ..TileSpans::default() }
+}
