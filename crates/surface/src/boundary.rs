@@ -142,8 +142,8 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
         let rows = cells.rows();
         for at in (0..whole).step_by(BATCH) {
             let numbers = of_points(simd, &rows, &piece.positions[at..at + BATCH]);
-            for i in 0..BATCH {
-                keep.add(piece, (at + i, numbers[i]), memory, &mut kept);
+            for (i, cell) in numbers.into_iter().enumerate() {
+                keep.add(piece, (at + i, cell), memory, &mut kept);
             }
         }
         for i in whole..count {

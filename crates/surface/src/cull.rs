@@ -272,9 +272,9 @@ fn each_cell_inline<S: Simd, F: FnMut(u32)>(
     let rest = batches.remainder();
     for (b, batch) in batches.enumerate() {
         let cells = of_points(simd, &rows, batch);
-        for i in 0..BATCH {
+        for (i, cell) in cells.into_iter().enumerate() {
             if all || piece.radius(b * BATCH + i) >= least {
-                one(cells[i]);
+                one(cell);
             }
         }
     }

@@ -112,24 +112,24 @@ impl<const IDS: bool> Intervals<IDS> {
         joins.select(entry.min(new.entry), entry).store_slice(&mut open.entry.0);
         joins.select(exit.max(new.exit), exit).store_slice(&mut open.exit.0);
         if IDS {
-            self.join_ends(simd, (block, index), (entry, exit), joins, new);
+            self.join_ends(simd, (block, index), &Stretch { hit: joins, entry, exit }, new);
         }
         let apart = new.hit & !meets;
         if apart.any_true() {
-            self.part(simd, (block, index), (entry, exit), apart, new);
+            self.part(simd, (block, index), &Stretch { hit: apart, entry, exit }, new);
         }
     }
 
-    /// Tells ends of open spans their particle; at equal depth the lower index.
+    /// Tells the ends of open spans that `before` chooses their particle; at equal depth the lower index.
     #[inline(always)]
     fn join_ends<S: Simd>(
         &mut self,
         simd: S,
         (block, index): (usize, u32),
-        (entry, exit): (f32x16<S>, f32x16<S>),
-        joins: <f32x16<S> as SimdBase<S>>::Mask,
+        before: &Stretch<S>,
         new: &Stretch<S>,
     ) {
+        let (joins, entry, exit) = (before.hit, before.entry, before.exit);
         let index = u32x16::splat(simd, index);
         let ends = &mut self.ends[block];
         let entry_of = u32x16::from_slice(simd, &ends.entry);
@@ -142,16 +142,17 @@ impl<const IDS: bool> Intervals<IDS> {
         last.select(index, exit_of).store_slice(&mut ends.exit);
     }
 
-    /// Takes stretches that do not meet the open span of their column: the nearer one is logged.
+    /// Takes stretches that do not meet the open span of their column, which `before` chooses: the
+    /// nearer one is logged.
     #[inline(always)]
     fn part<S: Simd>(
         &mut self,
         simd: S,
         (block, index): (usize, u32),
-        (entry, exit): (f32x16<S>, f32x16<S>),
-        apart: <f32x16<S> as SimdBase<S>>::Mask,
+        before: &Stretch<S>,
         new: &Stretch<S>,
     ) {
+        let (apart, entry, exit) = (before.hit, before.entry, before.exit);
         let open = &mut self.open[block];
         let later = apart & new.entry.simd_gt(exit);
         let none = exit.simd_eq(f32x16::splat(simd, f32::NEG_INFINITY));

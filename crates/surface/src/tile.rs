@@ -125,7 +125,7 @@ impl TileRays {
             let a = self.a[block % self.side].load(simd);
             let b = self.b[block / self.side].load(simd);
             let mut inverse = [Lanes([0.0; LANES]); 3];
-            for axis in 0..3 {
+            for (axis, inverse) in inverse.iter_mut().enumerate() {
                 let mut along = f32x16::splat(simd, rays.forward[axis]);
                 if rays.projection == Projection::Perspective {
                     let up = f32x16::splat(simd, rays.up[axis]);
@@ -134,7 +134,7 @@ impl TileRays {
                 }
                 // A ray along a face is a little askew: no division by zero.
                 let along = along.abs().simd_lt(least).select(least, along);
-                (one / along).store_slice(&mut inverse[axis].0);
+                (one / along).store_slice(&mut inverse.0);
             }
             self.inverse.push(inverse);
         }
