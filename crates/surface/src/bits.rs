@@ -180,6 +180,16 @@ impl Columns for BitColumns<'_> {
     }
 
     #[inline(always)]
+    fn put_core<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>) {
+        self.put(simd, block, new, 0);
+    }
+
+    fn settle(&mut self) {}
+
+    #[inline(always)]
+    fn end<S: Simd>(&mut self, _: S) {}
+
+    #[inline(always)]
     fn holds<S: Simd>(&self, _: S, _: usize, _: f32, _: f32) -> bool {
         false
     }

@@ -92,6 +92,35 @@ impl Boundary {
     }
 }
 
+impl Cubes {
+    /// The cubes in such an order that rays whose direction has the signs of `forward` meet them one
+    /// after the other: they are nodes of an octree, whose eight parts are visited from the nearest to
+    /// the farthest corner. A key has the bits of the places along x, y and z in turn.
+    pub fn front_to_back(&self, forward: Vec3) -> Vec<Cube> {
+        let mirrored = forward.to_array().map(|v| v < 0.0);
+        let key = |cube: &Cube| {
+            let place = |axis: usize| {
+                let place = cube[axis] as u32 & 0x1f_ffff;
+                if mirrored[axis] { 0x1f_ffff - place } else { place }
+            };
+            thirds(place(0)) | thirds(place(1)) << 1 | thirds(place(2)) << 2
+        };
+        let mut keyed: Vec<(u64, Cube)> = self.cubes.iter().map(|c| (key(c), *c)).collect();
+        keyed.par_sort_unstable_by_key(|(key, _)| *key);
+        keyed.into_iter().map(|(_, cube)| cube).collect()
+    }
+}
+
+/// Each of the lower 21 bits of a word, followed by two zeros.
+fn thirds(word: u32) -> u64 {
+    let mut w = u64::from(word) & 0x1f_ffff;
+    w = (w | w << 32) & 0x1f_0000_0000_ffff;
+    w = (w | w << 16) & 0x1f_0000_ff00_00ff;
+    w = (w | w << 8) & 0x100f_00f0_0f00_f00f;
+    w = (w | w << 4) & 0x10c3_0c30_c30c_30c3;
+    (w | w << 2) & 0x1249_2492_4924_9249
+}
+
 impl Boundary {
     /// The corner of the lattice of cells and their edge; `None` without any.
     pub fn lattice(&self) -> Option<(Vec3, f32)> {

@@ -24,6 +24,16 @@ pub(crate) struct TileSpans {
 }
 
 impl TileSpans {
+    /// Room for so many pixels and spans.
+    pub fn with_capacity(pixels: usize, spans: usize, particles: bool) -> Self {
+        Self {
+            counts: Vec::with_capacity(pixels),
+            depths: Vec::with_capacity(2 * spans),
+            extended: Vec::new(),
+            particles: Vec::with_capacity(if particles { 2 * spans } else { 0 }),
+        }
+    }
+
     /// Adds a pixel with these spans, of which it stores at most `most`.
     #[inline(always)]
     pub fn add(&mut self, (pixel, most): (u32, usize), spans: &[Span], particles: &[[u32; 2]]) {

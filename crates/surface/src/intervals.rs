@@ -8,12 +8,16 @@
 //! The result does not depend on the order. Stretches within the gap of each other are in one span
 //! whatever comes later, since more stretches make what is empty only shorter; and spans that are not
 //! within the gap in the end never were.
+//!
+//! The inner cells come first, by themselves. What they make of a column, its *cores*, waits until a
+//! sphere is met that lies behind: one can be far longer than the spheres before it are apart.
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
 use crate::Spans;
 use crate::compress::{Span, TileSpans};
 use crate::items::{BLOCK, LANES};
+use crate::splat::Columns;
 use crate::tile::{Lanes, Stretch, TileRays};
 
 /// Sixteen columns.
@@ -24,6 +28,8 @@ struct Open {
     exit: Lanes,
     /// (g / |direction|)²: the square of the gap in depth.
     gap2: Lanes,
+    /// Entry of the core that waits; +∞ without one.
+    core: Lanes,
 }
 
 /// The particles of the ends of sixteen open spans.
@@ -36,31 +42,43 @@ struct Ends {
 /// The columns of a tile. With `IDS` each end of a span knows its particle.
 #[derive(Debug, Default)]
 pub(crate) struct Intervals<const IDS: bool> {
+    /// In world units.
+    gap: f32,
+    /// Blocks along the tile's edge.
+    side: usize,
     open: Vec<Open>,
     ends: Vec<Ends>,
     log: Log,
     lists: Lists,
+    /// Exits of the cores that wait.
+    core_exits: Vec<Lanes>,
+    /// All cores, and the next one of each pixel, where some pixel has several.
+    cores: Lists,
+    next_core: Vec<u32>,
 }
 
 /// Spans that are no longer open, in the order they were closed.
 #[derive(Debug, Default)]
 struct Log {
     len: usize,
-    /// Column: its block and its lane.
-    column: Vec<u32>,
+    /// The tile's pixel, row by row.
+    pixel: Vec<u32>,
     entry: Vec<f32>,
     exit: Vec<f32>,
     entry_of: Vec<u32>,
     exit_of: Vec<u32>,
 }
 
-/// The spans of all columns, column after column.
+/// The spans of all pixels of a tile, row by row.
 #[derive(Debug, Default)]
 struct Lists {
     starts: Vec<u32>,
     spans: Vec<Span>,
     ends: Vec<[u32; 2]>,
 }
+
+const INFINITE: Lanes = Lanes([f32::INFINITY; LANES]);
+const MINUS_INFINITE: Lanes = Lanes([f32::NEG_INFINITY; LANES]);
 
 /// Whether a stretch that is empty from `from` to `to` is no gap; negative ones are not empty at all.
 #[inline(always)]
@@ -69,40 +87,169 @@ fn bridged(from: f32, to: f32, gap2: f32) -> bool {
     empty * empty <= gap2
 }
 
-impl<const IDS: bool> Intervals<IDS> {
-    /// Begins a tile. `gap` is in world units.
+impl<const IDS: bool> Columns for Intervals<IDS> {
     #[inline(always)]
-    pub fn begin<S: Simd>(&mut self, simd: S, rays: &TileRays, gap: f32) {
+    fn begin<S: Simd>(&mut self, simd: S, rays: &TileRays) {
+        self.side = rays.side;
         self.open.clear();
         self.ends.clear();
         self.log.len = 0;
-        let gap2 = f32x16::splat(simd, gap * gap);
+        self.next_core.clear();
+        let gap2 = f32x16::splat(simd, self.gap * self.gap);
         for inverse_q in &rays.inverse_q {
-            let mut open = Open {
-                entry: Lanes([f32::INFINITY; LANES]),
-                exit: Lanes([f32::NEG_INFINITY; LANES]),
-                gap2: Lanes([0.0; LANES]),
-            };
+            let mut open =
+                Open { entry: INFINITE, exit: MINUS_INFINITE, gap2: INFINITE, core: INFINITE };
             (inverse_q.load(simd) * gap2).store_slice(&mut open.gap2.0);
             self.open.push(open);
             if IDS {
                 self.ends.push(Ends { entry: [0; LANES], exit: [0; LANES] });
             }
         }
+        self.close_outside(rays);
     }
 
-    /// Whether depths `front` to `back` lie in the open spans of all columns of a block.
+    /// Adds a stretch of inner cells.
     #[inline(always)]
-    pub fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool {
+    fn put_core<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>) {
+        self.join(simd, block, new, Spans::NO_PARTICLE);
+    }
+
+    /// All inner cells have come: what they make waits.
+    fn settle(&mut self) {
+        self.core_exits.clear();
+        if self.log.len > 0 {
+            return self.settle_lists();
+        }
+        for open in &mut self.open {
+            self.core_exits.push(open.exit);
+            for lane in 0..LANES {
+                if is_span(open.entry.0[lane], open.exit.0[lane]) {
+                    open.core.0[lane] = open.entry.0[lane];
+                    (open.entry.0[lane], open.exit.0[lane]) = (f32::INFINITY, f32::NEG_INFINITY);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool {
         let open = &self.open[block];
         let within = open.entry.load(simd).simd_lt(f32x16::splat(simd, front))
             & open.exit.load(simd).simd_gt(f32x16::splat(simd, back));
         within.all_true()
     }
 
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
+        let due = new.hit & self.open[block].core.load(simd).simd_lt(new.entry);
+        if due.any_true() {
+            self.wake(simd, block, due, new.entry);
+        }
+        self.join(simd, block, new, index);
+    }
+
+    /// The cores that still wait.
+    #[inline(always)]
+    fn end<S: Simd>(&mut self, simd: S) {
+        let infinity = f32x16::splat(simd, f32::INFINITY);
+        for block in 0..self.open.len() {
+            let due = self.open[block].core.load(simd).simd_lt(infinity);
+            if due.any_true() {
+                self.wake(simd, block, due, infinity);
+            }
+        }
+    }
+}
+
+impl<const IDS: bool> Intervals<IDS> {
+    /// Columns that bridge a gap, in world units.
+    pub fn new(gap: f32) -> Self {
+        Self { gap, ..Self::default() }
+    }
+
+    /// Columns outside the picture hold all there can be, so that nothing is ever logged of them.
+    fn close_outside(&mut self, rays: &TileRays) {
+        let pixels = rays.side as u32 * BLOCK;
+        if rays.pixels == (pixels, pixels) {
+            return;
+        }
+        for (block, open) in self.open.iter_mut().enumerate() {
+            let (x0, y0) = ((block % rays.side) as u32 * BLOCK, (block / rays.side) as u32 * BLOCK);
+            for lane in 0..LANES {
+                let (x, y) = (x0 + lane as u32 % BLOCK, y0 + lane as u32 / BLOCK);
+                if x >= rays.pixels.0 || y >= rays.pixels.1 {
+                    open.entry.0[lane] = f32::NEG_INFINITY;
+                    open.exit.0[lane] = f32::INFINITY;
+                }
+            }
+        }
+    }
+
+    /// Settles where some columns have several cores.
+    #[cold]
+    fn settle_lists(&mut self) {
+        self.cores.sort::<false>(&self.log, &self.open, &[]);
+        self.log.len = 0;
+        self.next_core.extend_from_slice(&self.cores.starts);
+        for (block, open) in self.open.iter_mut().enumerate() {
+            self.core_exits.push(MINUS_INFINITE);
+            for lane in 0..LANES {
+                let pixel = pixel_of(self.side, block, lane);
+                let (from, to) = (self.cores.starts[pixel], self.cores.starts[pixel + 1]);
+                if from == to {
+                    continue;
+                }
+                (open.entry.0[lane], open.exit.0[lane]) = (f32::INFINITY, f32::NEG_INFINITY);
+                // In order, so that none is woken before its time.
+                let list = &mut self.cores.spans[from as usize..to as usize];
+                list.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+                (open.core.0[lane], self.core_exits[block].0[lane]) = (list[0][0], list[0][1]);
+                self.next_core[pixel] += 1;
+            }
+        }
+    }
+
+    /// Adds the cores that are due: those that begin before `until`.
+    #[inline(always)]
+    fn wake<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        mut due: <f32x16<S> as SimdBase<S>>::Mask,
+        until: f32x16<S>,
+    ) {
+        while due.any_true() {
+            let entry = self.open[block].core.load(simd);
+            let exit = self.core_exits[block].load(simd);
+            self.join(simd, block, &Stretch { hit: due, entry, exit }, Spans::NO_PARTICLE);
+            let none = f32x16::splat(simd, f32::INFINITY);
+            due.select(none, entry).store_slice(&mut self.open[block].core.0);
+            if self.next_core.is_empty() {
+                return;
+            }
+            self.next_cores(block, due.to_bitmask());
+            due &= self.open[block].core.load(simd).simd_lt(until);
+        }
+    }
+
+    /// Lets the next cores of some lanes wait.
+    #[cold]
+    fn next_cores(&mut self, block: usize, lanes: u64) {
+        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+            let pixel = pixel_of(self.side, block, lane);
+            let next = self.next_core[pixel];
+            if next < self.cores.starts[pixel + 1] {
+                let [entry, exit] = self.cores.spans[next as usize];
+                self.open[block].core.0[lane] = entry;
+                self.core_exits[block].0[lane] = exit;
+                self.next_core[pixel] += 1;
+            }
+        }
+    }
+
     /// Adds a stretch of each ray of a block that is hit, all of one particle.
     #[inline(always)]
-    pub fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
+    fn join<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
         let open = &mut self.open[block];
         let (entry, exit) = (open.entry.load(simd), open.exit.load(simd));
         let zero = f32x16::splat(simd, 0.0);
@@ -175,68 +322,100 @@ impl<const IDS: bool> Intervals<IDS> {
             self.log.reserve::<false>();
         }
         let span = (later.select(entry, new.entry), later.select(exit, new.exit));
-        self.log.add(simd, block, span, closed);
+        let first = pixel_of(self.side, block, 0);
+        self.log.add(simd, (first, self.side), span, closed);
     }
 
-    /// Ends the tile: its spans, at most `most` of each pixel.
+    /// The tile's spans, at most `most` of each pixel.
     pub fn finish(&mut self, rays: &TileRays, width: u32, most: usize) -> TileSpans {
-        let (log, lists) = (&self.log, &mut self.lists);
-        lists.sort::<IDS>(log, &self.open, &self.ends);
-        let mut spans = TileSpans::default();
+        self.lists.sort::<IDS>(&self.log, &self.open, &self.ends);
         let pixels = rays.pixels.0 * rays.pixels.1;
-        spans.counts.reserve_exact(pixels as usize);
-        spans.depths.reserve_exact(2 * lists.spans.len());
+        let mut spans = TileSpans::with_capacity(pixels as usize, self.lists.spans.len(), IDS);
         for y in 0..rays.pixels.1 {
-            for x in 0..rays.pixels.0 {
-                let block = (y / BLOCK) as usize * rays.side + (x / BLOCK) as usize;
-                let lane = (y % BLOCK * BLOCK + x % BLOCK) as usize;
-                let column = block * LANES + lane;
-                let range = lists.starts[column] as usize..lists.starts[column + 1] as usize;
-                let list = &mut lists.spans[range.clone()];
-                let ends = if IDS { &mut lists.ends[range] } else { &mut [][..] };
-                let gap2 = self.open[block].gap2.0[lane];
-                let whole = list.windows(2).all(|w| !bridged(w[0][1], w[1][0], gap2));
-                let count = if whole { list.len() } else { merge(list, ends, gap2) };
-                let pixel = (rays.corner.1 + y) * width + rays.corner.0 + x;
-                let ends = &ends[..count.min(ends.len())];
-                spans.add((pixel, most), &list[..count], ends);
-            }
+            let first = (rays.corner.1 + y) * width + rays.corner.0;
+            self.finish_row(rays, (y as usize, first), most, &mut spans);
         }
         spans
     }
+
+    /// Adds row `y` of the tile, whose first pixel is number `first` of the picture.
+    fn finish_row(
+        &mut self,
+        rays: &TileRays,
+        (y, first): (usize, u32),
+        most: usize,
+        to: &mut TileSpans,
+    ) {
+        let row = y * self.side * BLOCK as usize;
+        for x in 0..rays.pixels.0 as usize {
+            let range =
+                self.lists.starts[row + x] as usize..self.lists.starts[row + x + 1] as usize;
+            if range.len() <= 1 {
+                to.counts.push(range.len() as u16);
+                to.depths.extend(self.lists.spans[range.clone()].iter().flatten());
+                if IDS {
+                    to.particles.extend(self.lists.ends[range].iter().flatten());
+                }
+                continue;
+            }
+            let list = &mut self.lists.spans[range.clone()];
+            let ends = if IDS { &mut self.lists.ends[range] } else { &mut [][..] };
+            let lane = y % BLOCK as usize * BLOCK as usize + x % BLOCK as usize;
+            let block = y / BLOCK as usize * self.side + x / BLOCK as usize;
+            let gap2 = self.open[block].gap2.0[lane];
+            let whole = list.windows(2).all(|w| !bridged(w[0][1], w[1][0], gap2));
+            let count = if whole { list.len() } else { merge(list, ends, gap2) };
+            let ends = &ends[..count.min(ends.len())];
+            to.add((first + x as u32, most), &list[..count], ends);
+        }
+    }
+}
+
+/// Whether what a column has open is a span: it has one, and is in the picture.
+#[inline(always)]
+fn is_span(entry: f32, exit: f32) -> bool {
+    exit > f32::NEG_INFINITY && entry > f32::NEG_INFINITY
+}
+
+/// The pixel of a lane, in a tile of `side` blocks along its edge.
+#[inline(always)]
+fn pixel_of(side: usize, block: usize, lane: usize) -> usize {
+    let (x, y) = (block % side * BLOCK as usize, block / side * BLOCK as usize);
+    (y + lane / BLOCK as usize) * side * BLOCK as usize + x + lane % BLOCK as usize
 }
 
 impl Log {
     /// Makes room for sixteen more.
     #[inline(always)]
     fn reserve<const IDS: bool>(&mut self) {
-        if self.len + LANES > self.column.len() {
+        if self.len + LANES > self.pixel.len() {
             self.grow::<IDS>();
         }
     }
 
     #[cold]
     fn grow<const IDS: bool>(&mut self) {
-        let len = (2 * self.column.len()).max(1 << 12);
-        self.column.resize(len, 0);
+        let len = (2 * self.pixel.len()).max(1 << 12);
+        self.pixel.resize(len, 0);
         self.entry.resize(len, 0.0);
         self.exit.resize(len, 0.0);
         self.entry_of.resize(if IDS { len } else { 0 }, 0);
         self.exit_of.resize(if IDS { len } else { 0 }, 0);
     }
 
-    /// Adds the chosen ones of sixteen spans.
+    /// Adds the chosen ones of sixteen spans, of the block whose first pixel is number `first`.
     #[inline(always)]
     fn add<S: Simd>(
         &mut self,
         simd: S,
-        block: usize,
+        (first, side): (usize, usize),
         (entry, exit): (f32x16<S>, f32x16<S>),
         chosen: <f32x16<S> as SimdBase<S>>::Mask,
     ) {
-        let column = u32x16::from_slice(simd, &LANE) + (block * LANES) as u32;
+        let row = u32x16::from_slice(simd, &ROW) * (side as u32 * BLOCK);
+        let pixel = row + u32x16::from_slice(simd, &COLUMN) + first as u32;
         let to = self.len..self.len + LANES;
-        column.compress(chosen).store_slice(&mut self.column[to.clone()]);
+        pixel.compress(chosen).store_slice(&mut self.pixel[to.clone()]);
         entry.compress(chosen).store_slice(&mut self.entry[to.clone()]);
         exit.compress(chosen).store_slice(&mut self.exit[to]);
         self.len += chosen.to_bitmask().count_ones() as usize;
@@ -255,56 +434,67 @@ impl Log {
     }
 }
 
-const LANE: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// Row and column of each lane in its block.
+const ROW: [u32; LANES] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3];
+const COLUMN: [u32; LANES] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
 
 impl Lists {
-    /// Sorts the log by column, and adds the open span of each to its end.
+    /// Sorts the log by pixel, and adds the open span of each to its end.
     fn sort<const IDS: bool>(&mut self, log: &Log, open: &[Open], ends: &[Ends]) {
-        let columns = open.len() * LANES;
+        let pixels = open.len() * LANES;
+        let side = open.len().isqrt();
         let starts = &mut self.starts;
         starts.clear();
-        starts.resize(columns + 1, 0);
-        for column in &log.column[..log.len] {
-            starts[*column as usize] += 1;
+        starts.resize(pixels + 1, 0);
+        for pixel in &log.pixel[..log.len] {
+            starts[*pixel as usize] += 1;
         }
         let mut sum = 0;
-        for (block, open) in open.iter().enumerate() {
-            for lane in 0..LANES {
-                let start = &mut starts[block * LANES + lane];
-                let count = *start + u32::from(open.exit.0[lane] > f32::NEG_INFINITY);
+        for (fours, starts) in fours(open, side).zip(starts.chunks_exact_mut(4)) {
+            let (block, lanes) = fours;
+            for (lane, start) in lanes.zip(starts) {
+                let is_open = is_span(open[block].entry.0[lane], open[block].exit.0[lane]);
+                let count = *start + u32::from(is_open);
                 *start = sum;
                 sum += count;
             }
         }
-        self.spans.clear();
-        self.spans.resize(sum as usize, [0.0; 2]);
-        self.ends.clear();
-        self.ends.resize(if IDS { sum as usize } else { 0 }, [Spans::NO_PARTICLE; 2]);
+        // One more, which takes what is not open.
+        self.spans.resize(sum as usize + 1, [0.0; 2]);
+        self.ends.resize(if IDS { sum as usize + 1 } else { 0 }, [Spans::NO_PARTICLE; 2]);
         for i in 0..log.len {
-            let next = &mut starts[log.column[i] as usize];
+            let next = &mut starts[log.pixel[i] as usize];
             self.spans[*next as usize] = [log.entry[i], log.exit[i]];
             if IDS {
                 self.ends[*next as usize] = [log.entry_of[i], log.exit_of[i]];
             }
             *next += 1;
         }
-        for (block, open) in open.iter().enumerate() {
-            for lane in 0..LANES {
-                if open.exit.0[lane] > f32::NEG_INFINITY {
-                    let next = &mut starts[block * LANES + lane];
-                    self.spans[*next as usize] = [open.entry.0[lane], open.exit.0[lane]];
-                    if IDS {
-                        let ends = &ends[block];
-                        self.ends[*next as usize] = [ends.entry[lane], ends.exit[lane]];
-                    }
-                    *next += 1;
+        for (fours, starts) in fours(open, side).zip(starts.chunks_exact_mut(4)) {
+            let (block, lanes) = fours;
+            for (lane, next) in lanes.zip(starts) {
+                let (entry, exit) = (open[block].entry.0[lane], open[block].exit.0[lane]);
+                let is_open = is_span(entry, exit);
+                let place = if is_open { *next } else { sum };
+                self.spans[place as usize] = [entry, exit];
+                if IDS {
+                    self.ends[place as usize] = [ends[block].entry[lane], ends[block].exit[lane]];
                 }
+                *next += u32::from(is_open);
             }
         }
+        self.spans.truncate(sum as usize);
         // Each start has become the next one's.
-        starts.copy_within(..columns, 1);
+        starts.copy_within(..pixels, 1);
         starts[0] = 0;
     }
+}
+
+/// Block and lanes of each four pixels in a row, row by row.
+fn fours(open: &[Open], side: usize) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
+    (0..open.len() / side.max(1)).flat_map(move |row| {
+        (0..4).flat_map(move |y| (0..side).map(move |x| (row * side + x, 4 * y..4 * y + 4)))
+    })
 }
 
 /// Sorts the spans of a column and merges those within the gap. Gives how many there are.

@@ -76,6 +76,14 @@ impl Tiles {
     }
 }
 
+impl Item {
+    /// The least depth of a sphere.
+    #[inline(always)]
+    pub fn front(&self) -> f32 {
+        self.at[2] - self.size
+    }
+}
+
 impl Binned {
     /// The items of a tile.
     pub fn of(&self, tile: usize) -> &[Item] {
@@ -92,12 +100,12 @@ impl Binning {
             dispatch!(level, simd => place_spheres(simd, &lens, part, placed));
             placed.by_tile(tiles)
         });
-        let cubes =
-            boundary.cubes.cubes.par_chunks(CUBES).map_init(Placed::default, |placed, part| {
-                placed.items.clear();
-                dispatch!(level, simd => place_cubes(simd, &lens, part, placed));
-                placed.by_tile(tiles)
-            });
+        let ordered = boundary.cubes.front_to_back(view.rays.forward);
+        let cubes = ordered.par_chunks(CUBES).map_init(Placed::default, |placed, part| {
+            placed.items.clear();
+            dispatch!(level, simd => place_cubes(simd, &lens, part, placed));
+            placed.by_tile(tiles)
+        });
         Self { spheres: spheres.collect(), cubes: cubes.collect() }
     }
 

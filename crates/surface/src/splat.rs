@@ -1,5 +1,5 @@
-//! Splatting a tile (Zirr & Dachsbacher 2015, §4.1): its items near to far, each onto the blocks of rays
-//! that it may touch.
+//! Splatting a tile (Zirr & Dachsbacher 2015, §4.1): its inner cells, then its spheres, near to far, each
+//! onto the blocks of rays that it may touch.
 //!
 //! The order decides only how much work there is: what comes near to far mostly extends a column's open
 //! span, and what lies within the open spans of all columns of a block changes nothing there.
@@ -16,14 +16,21 @@ use crate::tile::{Stretch, TileRays};
 /// Steps of depth that items are sorted by.
 const STEPS: usize = 512;
 
-/// Columns of a tile, onto which stretches are put in any order.
+/// Columns of a tile, onto which stretches are put: first those of inner cells, then those of spheres,
+/// each in any order.
 pub(crate) trait Columns {
     /// Begins a tile.
     fn begin<S: Simd>(&mut self, simd: S, rays: &TileRays);
+    /// Adds a stretch of each ray of a block that is in an inner cell.
+    fn put_core<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>);
+    /// No more of them come.
+    fn settle(&mut self);
     /// Whether what lies at depths `front` to `back` would change nothing in a block.
     fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool;
-    /// Adds a stretch of each ray of a block that is hit.
+    /// Adds a stretch of each ray of a block that is in a sphere.
     fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32);
+    /// Nothing more comes.
+    fn end<S: Simd>(&mut self, simd: S);
 }
 
 /// What a tile is drawn with.
@@ -40,15 +47,14 @@ pub(crate) struct Painter<'a> {
 pub(crate) struct Easel {
     pub rays: TileRays,
     spheres: Sorted,
-    cubes: Sorted,
 }
 
 /// Items of a tile by their least depth.
 #[derive(Debug, Default)]
 struct Sorted {
     items: Vec<Item>,
-    /// First item of each step, and the end of the last.
-    starts: Vec<u32>,
+    /// Where the next item of each step goes.
+    next: Vec<u32>,
 }
 
 /// Depths as steps.
@@ -66,40 +72,28 @@ impl Steps {
 }
 
 impl Sorted {
-    fn sort(
-        &mut self,
-        (parts, tile): (&[Binned], usize),
-        steps: Steps,
-        front: impl Fn(&Item) -> f32,
-    ) {
-        self.starts.clear();
-        self.starts.resize(STEPS + 1, 0);
+    fn sort(&mut self, (parts, tile): (&[Binned], usize), steps: Steps) {
+        self.next.clear();
+        self.next.resize(STEPS, 0);
         let mut count = 0;
         for part in parts {
             for item in part.of(tile) {
-                self.starts[steps.of(front(item))] += 1;
+                self.next[steps.of(item.front())] += 1;
             }
             count += part.of(tile).len();
         }
         let mut sum = 0;
-        for start in &mut self.starts {
-            sum += std::mem::replace(start, sum);
+        for next in &mut self.next {
+            sum += std::mem::replace(next, sum);
         }
         self.items.resize(count, Item::default());
         for part in parts {
             for item in part.of(tile) {
-                let next = &mut self.starts[steps.of(front(item))];
+                let next = &mut self.next[steps.of(item.front())];
                 self.items[*next as usize] = *item;
                 *next += 1;
             }
         }
-        // Each start has become the next one's.
-        self.starts.copy_within(..STEPS, 1);
-        self.starts[0] = 0;
-    }
-
-    fn step(&self, step: usize) -> &[Item] {
-        &self.items[self.starts[step] as usize..self.starts[step + 1] as usize]
     }
 }
 
@@ -110,25 +104,17 @@ impl Painter<'_> {
         spheres.iter().chain(cubes).any(|part| !part.of(tile).is_empty())
     }
 
-    /// Sorts the items of a tile.
+    /// Sorts the spheres of a tile.
     fn sort(&self, tile: usize, easel: &mut Easel) {
-        let sphere_front = |item: &Item| item.at[2] - item.size;
-        let rays = &self.view.rays;
-        let half = 0.5 * rays.forward.abs().element_sum();
-        let cube_front = |item: &Item| {
-            let middle = glam::Vec3::from_array(item.at) + 0.5 * item.size;
-            let middle = middle * self.cubes.edge + self.cubes.low - rays.origin;
-            middle.dot(rays.forward) - half * item.size * self.cubes.edge
-        };
+        let spheres = &self.binning.spheres[..];
         let (mut low, mut high) = (self.view.far, self.view.near);
-        let mut take = |front: f32| (low, high) = (low.min(front), high.max(front));
-        let Binning { spheres, cubes } = self.binning;
-        spheres.iter().flat_map(|p| p.of(tile)).for_each(|item| take(sphere_front(item)));
-        cubes.iter().flat_map(|p| p.of(tile)).for_each(|item| take(cube_front(item)));
+        for item in spheres.iter().flat_map(|part| part.of(tile)) {
+            let front = item.front();
+            (low, high) = (low.min(front), high.max(front));
+        }
         let low = low.max(self.view.near);
         let steps = Steps { low, per_depth: STEPS as f32 / (high - low).max(f32::MIN_POSITIVE) };
-        easel.spheres.sort((spheres, tile), steps, sphere_front);
-        easel.cubes.sort((cubes, tile), steps, cube_front);
+        easel.spheres.sort((spheres, tile), steps);
     }
 
     /// Draws a tile onto `columns`.
@@ -143,30 +129,31 @@ impl Painter<'_> {
         self.sort(tile, easel);
         easel.rays.turn(self.view, self.tiles, tile);
         easel.rays.square(simd, self.view.rays.projection);
-        if !easel.cubes.items.is_empty() {
-            easel.rays.invert(simd, self.view);
-        }
         columns.begin(simd, &easel.rays);
         match self.view.rays.projection {
-            Projection::Perspective => self.steps::<S, C, true>(simd, easel, columns),
-            Projection::Orthographic => self.steps::<S, C, false>(simd, easel, columns),
+            Projection::Perspective => self.items::<S, C, true>(simd, tile, easel, columns),
+            Projection::Orthographic => self.items::<S, C, false>(simd, tile, easel, columns),
         }
+        columns.end(simd);
     }
 
     #[inline(always)]
-    fn steps<S: Simd, C: Columns, const PERSPECTIVE: bool>(
+    fn items<S: Simd, C: Columns, const PERSPECTIVE: bool>(
         &self,
         simd: S,
-        easel: &Easel,
+        tile: usize,
+        easel: &mut Easel,
         columns: &mut C,
     ) {
-        for step in 0..STEPS {
-            for item in easel.cubes.step(step) {
+        if self.binning.cubes.iter().any(|part| !part.of(tile).is_empty()) {
+            easel.rays.invert(simd, self.view);
+            for item in self.binning.cubes.iter().flat_map(|part| part.of(tile)) {
                 self.cube::<S, C, PERSPECTIVE>(simd, &easel.rays, item, columns);
             }
-            for item in easel.spheres.step(step) {
-                sphere::<S, C, PERSPECTIVE>(simd, &easel.rays, item, columns);
-            }
+            columns.settle();
+        }
+        for item in &easel.spheres.items {
+            sphere::<S, C, PERSPECTIVE>(simd, &easel.rays, item, columns);
         }
     }
 
@@ -185,7 +172,7 @@ impl Painter<'_> {
                 let with = (&faces, &self.view.rays);
                 let new = rays.meet_cube::<S, PERSPECTIVE>(simd, (x, y), with);
                 if new.hit.any_true() {
-                    columns.put(simd, y * rays.side + x, &new, crate::Spans::NO_PARTICLE);
+                    columns.put_core(simd, y * rays.side + x, &new);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! From the boundary of a liquid to the spans of a picture, tile by tile on all cores.
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use crate::bits::BitColumns;
@@ -9,8 +9,8 @@ use crate::compress::{TileSpans, assemble};
 use crate::intervals::Intervals;
 use crate::items::{Binning, Tiles};
 use crate::layers::Layers;
-use crate::splat::{Columns, Easel, Painter, draw};
-use crate::tile::{Stretch, TileRays};
+use crate::splat::{Easel, Painter, draw};
+use crate::tile::TileRays;
 use crate::{Marks, Params, Representation, Spans, View};
 
 /// Most bytes of a tile's bits, for each thread.
@@ -66,44 +66,19 @@ pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level)
     (spans, stats)
 }
 
-/// Columns and the gap they bridge.
-#[derive(Default)]
-struct Exact<const IDS: bool> {
-    columns: Intervals<IDS>,
-    gap: f32,
-}
-
-impl<const IDS: bool> Columns for Exact<IDS> {
-    #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, rays: &TileRays) {
-        self.columns.begin(simd, rays, self.gap);
-    }
-
-    #[inline(always)]
-    fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool {
-        self.columns.holds(simd, block, front, back)
-    }
-
-    #[inline(always)]
-    fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
-        self.columns.put(simd, block, new, index);
-    }
-}
-
 /// Makes all tiles with intervals.
 fn exact<const IDS: bool>(painter: &Painter<'_>, params: &Params, level: Level) -> Vec<TileSpans> {
     let most = params.spans.clamp(1, u16::MAX.into()) as usize;
-    let begin =
-        || (Easel::default(), Exact::<IDS> { gap: params.gap.max(0.0), ..Exact::default() });
+    let begin = || (Easel::default(), Intervals::<IDS>::new(params.gap.max(0.0)));
     (0..painter.tiles.count())
         .into_par_iter()
         .with_max_len(1)
-        .map_init(begin, |(easel, exact), tile| {
+        .map_init(begin, |(easel, columns), tile| {
             if !painter.any(tile) {
                 return empty(painter, tile);
             }
-            dispatch!(level, simd => draw(simd, painter, tile, easel, exact));
-            exact.columns.finish(&easel.rays, painter.view.size.0, most)
+            dispatch!(level, simd => draw(simd, painter, tile, easel, columns));
+            columns.finish(&easel.rays, painter.view.size.0, most)
         })
         .collect()
 }
