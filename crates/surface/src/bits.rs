@@ -190,9 +190,7 @@ impl Columns for BitColumns<'_> {
     fn end<S: Simd>(&mut self, _: S) {}
 
     #[inline(always)]
-    fn holds<S: Simd>(&self, _: S, _: usize, _: f32, _: f32) -> bool {
-        false
-    }
+    fn reach<S: Simd>(&mut self, _: S, _: usize, _: f32) {}
 
     #[inline(always)]
     fn put<S: Simd>(&mut self, _: S, block: usize, new: &Stretch<S>, _: u32) {

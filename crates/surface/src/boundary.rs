@@ -136,24 +136,18 @@ struct Keep<'a> {
 }
 
 impl Keep<'_> {
-    /// Adds a particle in cell `cell` to `spheres[*kept]`, unless it is left out. The number stays then,
-    /// so that what was written is overwritten: there is no branch to guess.
+    /// Adds a particle to `memory[*kept]`, unless it cannot be drawn.
     #[inline(always)]
-    fn add(&self, piece: &Piece<'_>, (i, cell): (usize, u32), part: &mut Part, kept: &mut usize) {
+    fn add(&self, piece: &Piece<'_>, i: usize, memory: &mut Part, kept: &mut usize) {
         let [x, y, z] = piece.positions[i];
         let radius = piece.radius(i) * self.scale;
-        let hidden = self.cells.is_some_and(|cells| cells.covers(cell, [x, y, z], radius));
         // Zero only if all are finite: ∞·0 and NaN·0 are NaN.
         let drawn = (x + y + z) * 0.0 == 0.0 && drawable(radius);
-        if let Some(place) = part.spheres.get_mut(*kept) {
-            *place = [x, y, z, radius];
+        memory.spheres[*kept] = [x, y, z, radius];
+        if self.ids {
+            memory.indices[*kept] = piece.indices.of(i);
         }
-        if self.ids
-            && let Some(place) = part.indices.get_mut(*kept)
-        {
-            *place = piece.indices.of(i);
-        }
-        *kept += usize::from(drawn && !hidden);
+        *kept += usize::from(drawn);
     }
 }
 
@@ -166,23 +160,36 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
         memory.indices.resize(if keep.ids { count } else { 0 }, 0);
     }
     let mut kept = 0;
-    let whole = count / BATCH * BATCH;
     if let Some(cells) = keep.cells {
         let rows = cells.rows();
+        let deep_hides = cells.deep_covers(piece.greatest_radius() * keep.scale);
+        let whole = count / BATCH * BATCH;
         for at in (0..whole).step_by(BATCH) {
             let numbers = of_points(simd, &rows, &piece.positions[at..at + BATCH]);
-            for (i, cell) in numbers.into_iter().enumerate() {
-                keep.add(piece, (at + i, cell), memory, &mut kept);
+            // Most are deep: no branch that has to be guessed for each.
+            let mut left = 0xffff;
+            if deep_hides {
+                for (i, cell) in numbers.iter().enumerate() {
+                    left ^= u32::from(cells.is_deep(*cell)) << i;
+                }
+            }
+            while left != 0 {
+                let i = left.trailing_zeros() as usize % BATCH;
+                left &= left - 1;
+                let (p, radius) = (piece.positions[at + i], piece.radius(at + i) * keep.scale);
+                if !cells.covers(numbers[i], p, radius) {
+                    keep.add(piece, at + i, memory, &mut kept);
+                }
             }
         }
         for i in whole..count {
-            let cell = cells.cell(piece.positions[i]);
-            keep.add(piece, (i, cell), memory, &mut kept);
+            let (p, radius) = (piece.positions[i], piece.radius(i) * keep.scale);
+            if !cells.covers(cells.cell(p), p, radius) {
+                keep.add(piece, i, memory, &mut kept);
+            }
         }
     } else {
-        for i in 0..count {
-            keep.add(piece, (i, 0), memory, &mut kept);
-        }
+        (0..count).for_each(|i| keep.add(piece, i, memory, &mut kept));
     }
     Part {
         spheres: memory.spheres[..kept].to_vec(),

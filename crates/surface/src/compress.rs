@@ -78,10 +78,9 @@ pub(crate) fn assemble(view: &View, tiles: &Tiles, parts: &[TileSpans]) -> Spans
         far: view.far,
         starts: vec![0; view.pixels() + 1],
         depths: vec![0.0; total],
-        extended: parts.iter().flat_map(|part| part.extended.iter().copied()).collect(),
+        extended: Vec::new(),
         particles: vec![0; if with_particles { total } else { 0 }],
     };
-    spans.extended.par_sort_unstable_by_key(|e| e.pixel);
     if let Some(last) = spans.starts.last_mut() {
         *last = (total / 2) as u32;
     }
@@ -100,7 +99,9 @@ pub(crate) fn assemble(view: &View, tiles: &Tiles, parts: &[TileSpans]) -> Spans
         bands.push(Band { parts, starts, depths: own, particles: own_particles, first });
         first += (count / 2) as u32;
     }
-    bands.into_par_iter().for_each(|band| band.assemble(view.size.0 as usize));
+    let extended: Vec<Vec<Extended>> =
+        bands.into_par_iter().map(|band| band.assemble(view.size.0 as usize)).collect();
+    spans.extended = extended.concat();
     spans
 }
 
@@ -115,7 +116,8 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    fn assemble(self, width: usize) {
+    /// Gives the pixels that had more spans than they store.
+    fn assemble(self, width: usize) -> Vec<Extended> {
         let rows = self.starts.len() / width.max(1);
         let tile = self.parts[0].counts.len() / rows.max(1);
         // Where the next pixel and the next surface of each tile are.
@@ -141,5 +143,9 @@ impl Band<'_> {
                 }
             }
         }
+        let mut extended: Vec<Extended> =
+            self.parts.iter().flat_map(|part| &part.extended).copied().collect();
+        extended.sort_unstable_by_key(|e| e.pixel);
+        extended
     }
 }

@@ -133,13 +133,25 @@ impl Cells {
         self.places.in_rows()
     }
 
+    /// Whether a sphere of this radius lies within inner cells if its centre's cell is deep.
+    pub fn deep_covers(&self, radius: f32) -> bool {
+        radius <= (1.0 - SLACK) * self.edge
+    }
+
+    /// Whether a cell is deep.
+    #[inline(always)]
+    pub fn is_deep(&self, cell: u32) -> bool {
+        self.deep.get(cell)
+    }
+
     /// Whether a sphere with its centre `p` in cell number `cell` lies within inner cells.
     #[inline(always)]
     pub fn covers(&self, cell: u32, p: [f32; 3], radius: f32) -> bool {
-        if self.deep.get(cell) {
-            return radius <= (1.0 - SLACK) * self.edge;
+        if !self.inner.get(cell) {
+            return false;
         }
-        self.inner.get(cell) && radius <= (0.5 - SLACK) * self.edge && self.corner_is_inner(p)
+        self.deep.get(cell) && self.deep_covers(radius)
+            || radius <= (0.5 - SLACK) * self.edge && self.corner_is_inner(p)
     }
 
     /// Whether the eight cells around the corner nearest to `p` of its cell are inner.

@@ -10,7 +10,7 @@
 //! within the gap in the end never were.
 //!
 //! The inner cells come first, by themselves. What they make of a column, its *cores*, waits until a
-//! sphere is met that lies behind: one can be far longer than the spheres before it are apart.
+//! sphere comes that lies behind: one can be far longer than the spheres before it are apart.
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
@@ -19,6 +19,9 @@ use crate::compress::{Span, TileSpans};
 use crate::items::{BLOCK, LANES};
 use crate::splat::Columns;
 use crate::tile::{Lanes, Stretch, TileRays};
+
+/// Which of sixteen lanes.
+type Mask<S> = <f32x16<S> as SimdBase<S>>::Mask;
 
 /// Sixteen columns.
 #[repr(C, align(64))]
@@ -132,19 +135,16 @@ impl<const IDS: bool> Columns for Intervals<IDS> {
     }
 
     #[inline(always)]
-    fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool {
-        let open = &self.open[block];
-        let within = open.entry.load(simd).simd_lt(f32x16::splat(simd, front))
-            & open.exit.load(simd).simd_gt(f32x16::splat(simd, back));
-        within.all_true()
+    fn reach<S: Simd>(&mut self, simd: S, block: usize, front: f32) {
+        let front = f32x16::splat(simd, front);
+        let due = self.open[block].core.load(simd).simd_lt(front);
+        if due.any_true() {
+            self.wake(simd, block, due, front);
+        }
     }
 
     #[inline(always)]
     fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
-        let due = new.hit & self.open[block].core.load(simd).simd_lt(new.entry);
-        if due.any_true() {
-            self.wake(simd, block, due, new.entry);
-        }
         self.join(simd, block, new, index);
     }
 
@@ -211,13 +211,7 @@ impl<const IDS: bool> Intervals<IDS> {
 
     /// Adds the cores that are due: those that begin before `until`.
     #[inline(always)]
-    fn wake<S: Simd>(
-        &mut self,
-        simd: S,
-        block: usize,
-        mut due: <f32x16<S> as SimdBase<S>>::Mask,
-        until: f32x16<S>,
-    ) {
+    fn wake<S: Simd>(&mut self, simd: S, block: usize, mut due: Mask<S>, until: f32x16<S>) {
         while due.any_true() {
             let entry = self.open[block].core.load(simd);
             let exit = self.core_exits[block].load(simd);
@@ -248,82 +242,56 @@ impl<const IDS: bool> Intervals<IDS> {
     }
 
     /// Adds a stretch of each ray of a block that is hit, all of one particle.
+    ///
+    /// Where it does not meet the open span, the nearer one of the two is logged. There is no branch: it
+    /// could not be foreseen, and would wait for all of the arithmetic.
     #[inline(always)]
     fn join<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
+        self.log.reserve::<IDS>();
         let open = &mut self.open[block];
         let (entry, exit) = (open.entry.load(simd), open.exit.load(simd));
         let zero = f32x16::splat(simd, 0.0);
         let empty = (new.entry - exit).max(entry - new.exit).max(zero);
         let meets = (empty * empty).simd_le(open.gap2.load(simd));
         let joins = new.hit & meets;
-        joins.select(entry.min(new.entry), entry).store_slice(&mut open.entry.0);
-        joins.select(exit.max(new.exit), exit).store_slice(&mut open.exit.0);
-        if IDS {
-            self.join_ends(simd, (block, index), &Stretch { hit: joins, entry, exit }, new);
-        }
         let apart = new.hit & !meets;
-        if apart.any_true() {
-            self.part(simd, (block, index), &Stretch { hit: apart, entry, exit }, new);
+        let later = apart & new.entry.simd_gt(exit);
+        let none = exit.simd_eq(f32x16::splat(simd, f32::NEG_INFINITY));
+        let closed = apart & !none;
+        let joined = joins.select(entry.min(new.entry), entry);
+        later.select(new.entry, joined).store_slice(&mut open.entry.0);
+        let joined = joins.select(exit.max(new.exit), exit);
+        later.select(new.exit, joined).store_slice(&mut open.exit.0);
+        if IDS {
+            let before = Stretch { hit: joins, entry, exit };
+            self.tell_ends(simd, (block, index), (&before, new), (later, closed));
         }
+        let span = (later.select(entry, new.entry), later.select(exit, new.exit));
+        self.log.add(simd, (pixel_of(self.side, block, 0), self.side), span, closed);
     }
 
-    /// Tells the ends of open spans that `before` chooses their particle; at equal depth the lower index.
+    /// Tells the ends of open spans their particle, at equal depth the lower index, and those of spans
+    /// that are logged.
     #[inline(always)]
-    fn join_ends<S: Simd>(
+    fn tell_ends<S: Simd>(
         &mut self,
         simd: S,
         (block, index): (usize, u32),
-        before: &Stretch<S>,
-        new: &Stretch<S>,
+        (before, new): (&Stretch<S>, &Stretch<S>),
+        (later, closed): (Mask<S>, Mask<S>),
     ) {
-        let (joins, entry, exit) = (before.hit, before.entry, before.exit);
         let index = u32x16::splat(simd, index);
         let ends = &mut self.ends[block];
         let entry_of = u32x16::from_slice(simd, &ends.entry);
-        let tie = new.entry.simd_eq(entry) & index.simd_lt(entry_of);
-        let first = joins & (new.entry.simd_lt(entry) | tie);
-        first.select(index, entry_of).store_slice(&mut ends.entry);
+        let tie = new.entry.simd_eq(before.entry) & index.simd_lt(entry_of);
+        let first = before.hit & (new.entry.simd_lt(before.entry) | tie);
+        (first | later).select(index, entry_of).store_slice(&mut ends.entry);
         let exit_of = u32x16::from_slice(simd, &ends.exit);
-        let tie = new.exit.simd_eq(exit) & index.simd_lt(exit_of);
-        let last = joins & (new.exit.simd_gt(exit) | tie);
-        last.select(index, exit_of).store_slice(&mut ends.exit);
-    }
-
-    /// Takes stretches that do not meet the open span of their column, which `before` chooses: the
-    /// nearer one is logged.
-    #[inline(always)]
-    fn part<S: Simd>(
-        &mut self,
-        simd: S,
-        (block, index): (usize, u32),
-        before: &Stretch<S>,
-        new: &Stretch<S>,
-    ) {
-        let (apart, entry, exit) = (before.hit, before.entry, before.exit);
-        let open = &mut self.open[block];
-        let later = apart & new.entry.simd_gt(exit);
-        let none = exit.simd_eq(f32x16::splat(simd, f32::NEG_INFINITY));
-        let entry_now = open.entry.load(simd);
-        let exit_now = open.exit.load(simd);
-        later.select(new.entry, entry_now).store_slice(&mut open.entry.0);
-        later.select(new.exit, exit_now).store_slice(&mut open.exit.0);
-        let closed = apart & !none;
-        if IDS {
-            let ends = &mut self.ends[block];
-            let index = u32x16::splat(simd, index);
-            let entry_of = u32x16::from_slice(simd, &ends.entry);
-            let exit_of = u32x16::from_slice(simd, &ends.exit);
-            later.select(index, entry_of).store_slice(&mut ends.entry);
-            later.select(index, exit_of).store_slice(&mut ends.exit);
-            let of = (later.select(entry_of, index), later.select(exit_of, index));
-            self.log.reserve::<true>();
-            self.log.add_ends(of, closed);
-        } else {
-            self.log.reserve::<false>();
-        }
-        let span = (later.select(entry, new.entry), later.select(exit, new.exit));
-        let first = pixel_of(self.side, block, 0);
-        self.log.add(simd, (first, self.side), span, closed);
+        let tie = new.exit.simd_eq(before.exit) & index.simd_lt(exit_of);
+        let last = before.hit & (new.exit.simd_gt(before.exit) | tie);
+        (last | later).select(index, exit_of).store_slice(&mut ends.exit);
+        let logged = (later.select(entry_of, index), later.select(exit_of, index));
+        self.log.add_ends(logged, closed);
     }
 
     /// The tile's spans, at most `most` of each pixel.
@@ -410,7 +378,7 @@ impl Log {
         simd: S,
         (first, side): (usize, usize),
         (entry, exit): (f32x16<S>, f32x16<S>),
-        chosen: <f32x16<S> as SimdBase<S>>::Mask,
+        chosen: Mask<S>,
     ) {
         let row = u32x16::from_slice(simd, &ROW) * (side as u32 * BLOCK);
         let pixel = row + u32x16::from_slice(simd, &COLUMN) + first as u32;
@@ -423,11 +391,7 @@ impl Log {
 
     /// Adds the particles of the chosen ones; called before [`Self::add`].
     #[inline(always)]
-    fn add_ends<S: Simd>(
-        &mut self,
-        (entry_of, exit_of): (u32x16<S>, u32x16<S>),
-        chosen: <f32x16<S> as SimdBase<S>>::Mask,
-    ) {
+    fn add_ends<S: Simd>(&mut self, (entry_of, exit_of): (u32x16<S>, u32x16<S>), chosen: Mask<S>) {
         let to = self.len..self.len + LANES;
         entry_of.compress(chosen).store_slice(&mut self.entry_of[to.clone()]);
         exit_of.compress(chosen).store_slice(&mut self.exit_of[to]);

@@ -145,6 +145,14 @@ impl<'a> Source<'a> {
 }
 
 impl Piece<'_> {
+    /// The greatest unscaled radius; 0 without particles.
+    pub fn greatest_radius(&self) -> f32 {
+        match self.radii {
+            Radii::Uniform(r) => r,
+            Radii::Each(radii) => radii.iter().copied().fold(0.0, f32::max),
+        }
+    }
+
     /// The unscaled radius of the chunk's `i`-th particle.
     #[inline(always)]
     pub fn radius(&self, i: usize) -> f32 {

@@ -2,7 +2,7 @@
 //! onto the blocks of rays that it may touch.
 //!
 //! The order decides only how much work there is: what comes near to far mostly extends a column's open
-//! span, and what lies within the open spans of all columns of a block changes nothing there.
+//! span.
 
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd_macros::simd;
@@ -25,8 +25,8 @@ pub(crate) trait Columns {
     fn put_core<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>);
     /// No more of them come.
     fn settle(&mut self);
-    /// Whether what lies at depths `front` to `back` would change nothing in a block.
-    fn holds<S: Simd>(&self, simd: S, block: usize, front: f32, back: f32) -> bool;
+    /// From now on, what comes to a block lies mostly behind depth `front`.
+    fn reach<S: Simd>(&mut self, simd: S, block: usize, front: f32);
     /// Adds a stretch of each ray of a block that is in a sphere.
     fn put<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32);
     /// Nothing more comes.
@@ -187,14 +187,12 @@ fn sphere<S: Simd, C: Columns, const PERSPECTIVE: bool>(
     columns: &mut C,
 ) {
     let ball = TileRays::ball(simd, item);
-    let (front, back) = (item.at[2] - item.size, item.at[2] + item.size);
+    let front = item.front();
     let [x0, x1, y0, y1] = item.blocks.map(usize::from);
     for y in y0..=y1 {
         for x in x0..=x1 {
             let block = y * rays.side + x;
-            if columns.holds(simd, block, front, back) {
-                continue;
-            }
+            columns.reach(simd, block, front);
             let new = rays.meet_ball::<S, PERSPECTIVE>(simd, (x, y), &ball);
             columns.put(simd, block, &new, item.index);
         }
