@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use crate::source::{Gathered, Piece, Source, Survey, drawable};
 use crate::{Cull, Params};
 
-/// Most cells; more would need too much memory. 32 MiB of bits.
+/// Most cells: 32 MiB of bits. A box that needs more, since it is nearly empty, has no inner cells.
 const MOST_CELLS: f64 = (1u64 << 28) as f64;
 /// Bytes that the threads' own copies of the bits may need together.
 const COPIES_BYTES: usize = 1 << 26;
@@ -76,8 +76,11 @@ impl Cells {
         }
         let edge = params.cell * survey.mean_radius;
         let extent = (survey.high - survey.low) / edge;
-        let cells = extent.to_array().iter().map(|e| f64::from(*e) + 3.0).product::<f64>();
-        if !drawable(edge) || !cells.is_finite() || cells > MOST_CELLS {
+        let [x, y, z] = extent.to_array().map(|e| f64::from(e) + 3.0);
+        let cells = (x / 64.0).ceil() * 64.0 * y * z;
+        // Counts take a byte for each cell.
+        let most = if params.cull == Cull::Occupancy { MOST_CELLS } else { MOST_CELLS / 8.0 };
+        if !drawable(edge) || !cells.is_finite() || cells > most {
             return None;
         }
         // A border all around.

@@ -76,6 +76,8 @@ struct Log {
 #[derive(Debug, Default)]
 struct Lists {
     starts: Vec<u32>,
+    /// How many spans there are; what follows them has any value.
+    count: usize,
     spans: Vec<Span>,
     ends: Vec<[u32; 2]>,
 }
@@ -243,11 +245,9 @@ impl<const IDS: bool> Intervals<IDS> {
 
     /// Adds a stretch of each ray of a block that is hit, all of one particle.
     ///
-    /// Where it does not meet the open span, the nearer one of the two is logged. There is no branch: it
-    /// could not be foreseen, and would wait for all of the arithmetic.
+    /// Where it does not meet the open span, the nearer one of the two is logged.
     #[inline(always)]
     fn join<S: Simd>(&mut self, simd: S, block: usize, new: &Stretch<S>, index: u32) {
-        self.log.reserve::<IDS>();
         let open = &mut self.open[block];
         let (entry, exit) = (open.entry.load(simd), open.exit.load(simd));
         let zero = f32x16::splat(simd, 0.0);
@@ -266,8 +266,11 @@ impl<const IDS: bool> Intervals<IDS> {
             let before = Stretch { hit: joins, entry, exit };
             self.tell_ends(simd, (block, index), (&before, new), (later, closed));
         }
-        let span = (later.select(entry, new.entry), later.select(exit, new.exit));
-        self.log.add(simd, (pixel_of(self.side, block, 0), self.side), span, closed);
+        if closed.any_true() {
+            let span = (later.select(entry, new.entry), later.select(exit, new.exit));
+            self.log.reserve::<IDS>();
+            self.log.add(simd, (pixel_of(self.side, block, 0), self.side), span, closed);
+        }
     }
 
     /// Tells the ends of open spans their particle, at equal depth the lower index, and those of spans
@@ -291,6 +294,7 @@ impl<const IDS: bool> Intervals<IDS> {
         let last = before.hit & (new.exit.simd_gt(before.exit) | tie);
         (last | later).select(index, exit_of).store_slice(&mut ends.exit);
         let logged = (later.select(entry_of, index), later.select(exit_of, index));
+        self.log.reserve::<IDS>();
         self.log.add_ends(logged, closed);
     }
 
@@ -298,7 +302,7 @@ impl<const IDS: bool> Intervals<IDS> {
     pub fn finish(&mut self, rays: &TileRays, width: u32, most: usize) -> TileSpans {
         self.lists.sort::<IDS>(&self.log, &self.open, &self.ends);
         let pixels = rays.pixels.0 * rays.pixels.1;
-        let mut spans = TileSpans::with_capacity(pixels as usize, self.lists.spans.len(), IDS);
+        let mut spans = TileSpans::with_capacity(pixels as usize, self.lists.count, IDS);
         for y in 0..rays.pixels.1 {
             let first = (rays.corner.1 + y) * width + rays.corner.0;
             self.finish_row(rays, (y as usize, first), most, &mut spans);
@@ -315,26 +319,39 @@ impl<const IDS: bool> Intervals<IDS> {
         to: &mut TileSpans,
     ) {
         let row = y * self.side * BLOCK as usize;
+        // Where what has not been added yet begins.
+        let mut from = self.lists.starts[row] as usize;
         for x in 0..rays.pixels.0 as usize {
             let range =
                 self.lists.starts[row + x] as usize..self.lists.starts[row + x + 1] as usize;
-            if range.len() <= 1 {
-                to.counts.push(range.len() as u16);
-                to.depths.extend(self.lists.spans[range.clone()].iter().flatten());
-                if IDS {
-                    to.particles.extend(self.lists.ends[range].iter().flatten());
+            if range.len() > 1 {
+                let lane = y % BLOCK as usize * BLOCK as usize + x % BLOCK as usize;
+                let block = y / BLOCK as usize * self.side + x / BLOCK as usize;
+                let gap2 = self.open[block].gap2.0[lane];
+                let list = &mut self.lists.spans[range.clone()];
+                let whole = list.windows(2).all(|w| !bridged(w[0][1], w[1][0], gap2));
+                if !whole || list.len() > most {
+                    let (before, at) = (from..range.start, range.clone());
+                    from = range.end;
+                    self.add_as_they_are(before, to);
+                    let list = &mut self.lists.spans[at.clone()];
+                    let ends = if IDS { &mut self.lists.ends[at] } else { &mut [][..] };
+                    let count = if whole { list.len() } else { merge(list, ends, gap2) };
+                    let ends = &ends[..count.min(ends.len())];
+                    to.add((first + x as u32, most), &list[..count], ends);
+                    continue;
                 }
-                continue;
             }
-            let list = &mut self.lists.spans[range.clone()];
-            let ends = if IDS { &mut self.lists.ends[range] } else { &mut [][..] };
-            let lane = y % BLOCK as usize * BLOCK as usize + x % BLOCK as usize;
-            let block = y / BLOCK as usize * self.side + x / BLOCK as usize;
-            let gap2 = self.open[block].gap2.0[lane];
-            let whole = list.windows(2).all(|w| !bridged(w[0][1], w[1][0], gap2));
-            let count = if whole { list.len() } else { merge(list, ends, gap2) };
-            let ends = &ends[..count.min(ends.len())];
-            to.add((first + x as u32, most), &list[..count], ends);
+            to.counts.push(range.len() as u16);
+        }
+        self.add_as_they_are(from..self.lists.starts[row + rays.pixels.0 as usize] as usize, to);
+    }
+
+    /// Adds spans as they are.
+    fn add_as_they_are(&self, range: std::ops::Range<usize>, to: &mut TileSpans) {
+        to.depths.extend_from_slice(self.lists.spans[range.clone()].as_flattened());
+        if IDS {
+            to.particles.extend_from_slice(self.lists.ends[range].as_flattened());
         }
     }
 }
@@ -414,18 +431,21 @@ impl Lists {
             starts[*pixel as usize] += 1;
         }
         let mut sum = 0;
-        for (fours, starts) in fours(open, side).zip(starts.chunks_exact_mut(4)) {
-            let (block, lanes) = fours;
-            for (lane, start) in lanes.zip(starts) {
-                let is_open = is_span(open[block].entry.0[lane], open[block].exit.0[lane]);
-                let count = *start + u32::from(is_open);
-                *start = sum;
-                sum += count;
+        for (row, starts) in starts[..pixels].chunks_exact_mut(4 * side.max(1)).enumerate() {
+            let blocks = &open[row / 4 * side..][..side];
+            for (open, starts) in blocks.iter().zip(starts.chunks_exact_mut(4)) {
+                for (lane, start) in starts.iter_mut().enumerate() {
+                    let lane = row % 4 * 4 + lane;
+                    let is_open = is_span(open.entry.0[lane], open.exit.0[lane]);
+                    let count = *start + u32::from(is_open);
+                    *start = sum;
+                    sum += count;
+                }
             }
         }
         // One more, which takes what is not open.
-        self.spans.resize(sum as usize + 1, [0.0; 2]);
-        self.ends.resize(if IDS { sum as usize + 1 } else { 0 }, [Spans::NO_PARTICLE; 2]);
+        grow(&mut self.spans, sum as usize + 1, [0.0; 2]);
+        grow(&mut self.ends, if IDS { sum as usize + 1 } else { 0 }, [Spans::NO_PARTICLE; 2]);
         for i in 0..log.len {
             let next = &mut starts[log.pixel[i] as usize];
             self.spans[*next as usize] = [log.entry[i], log.exit[i]];
@@ -434,31 +454,36 @@ impl Lists {
             }
             *next += 1;
         }
-        for (fours, starts) in fours(open, side).zip(starts.chunks_exact_mut(4)) {
-            let (block, lanes) = fours;
-            for (lane, next) in lanes.zip(starts) {
-                let (entry, exit) = (open[block].entry.0[lane], open[block].exit.0[lane]);
-                let is_open = is_span(entry, exit);
-                let place = if is_open { *next } else { sum };
-                self.spans[place as usize] = [entry, exit];
-                if IDS {
-                    self.ends[place as usize] = [ends[block].entry[lane], ends[block].exit[lane]];
+        for (row, starts) in starts[..pixels].chunks_exact_mut(4 * side.max(1)).enumerate() {
+            let first = row / 4 * side;
+            for (x, starts) in starts.chunks_exact_mut(4).enumerate() {
+                let open = &open[first + x];
+                for (lane, next) in starts.iter_mut().enumerate() {
+                    let lane = row % 4 * 4 + lane;
+                    let (entry, exit) = (open.entry.0[lane], open.exit.0[lane]);
+                    let is_open = is_span(entry, exit);
+                    let place = if is_open { *next } else { sum };
+                    self.spans[place as usize] = [entry, exit];
+                    if IDS {
+                        let ends = &ends[first + x];
+                        self.ends[place as usize] = [ends.entry[lane], ends.exit[lane]];
+                    }
+                    *next += u32::from(is_open);
                 }
-                *next += u32::from(is_open);
             }
         }
-        self.spans.truncate(sum as usize);
+        self.count = sum as usize;
         // Each start has become the next one's.
         starts.copy_within(..pixels, 1);
         starts[0] = 0;
     }
 }
 
-/// Block and lanes of each four pixels in a row, row by row.
-fn fours(open: &[Open], side: usize) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
-    (0..open.len() / side.max(1)).flat_map(move |row| {
-        (0..4).flat_map(move |y| (0..side).map(move |x| (row * side + x, 4 * y..4 * y + 4)))
-    })
+/// Makes a memory at least `len` long; what comes in addition is `value`.
+fn grow<T: Copy>(memory: &mut Vec<T>, len: usize, value: T) {
+    if memory.len() < len {
+        memory.resize(len, value);
+    }
 }
 
 /// Sorts the spans of a column and merges those within the gap. Gives how many there are.

@@ -8,6 +8,7 @@
 //! what is taken of cubes: from (cx − h)/z to (cx + h)/z, for z from the near plane or the box's front to
 //! its back. Rectangles are only a bound: which pixels are met is decided ray by ray.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
@@ -36,7 +37,8 @@ pub(crate) struct Tiles {
 }
 
 /// A sphere or a cube on a tile.
-#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub(crate) struct Item {
     /// A sphere's centre in view axes; a cube's place in cells.
     pub at: [f32; 3],
@@ -138,7 +140,7 @@ impl Placed {
             starts[tile + 1] += starts[tile];
         }
         let mut next = starts.clone();
-        let mut items = vec![Item::default(); self.items.len()];
+        let mut items: Vec<Item> = bytemuck::zeroed_vec(self.items.len());
         for (tile, item) in &self.items {
             let place = &mut next[*tile as usize];
             items[*place as usize] = *item;

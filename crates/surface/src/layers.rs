@@ -92,7 +92,8 @@ impl Layers {
 impl Guess {
     fn logarithm(starts: &[f32]) -> Self {
         let bits = |depth: f32| depth.max(f32::MIN_POSITIVE).to_bits();
-        let (first, last) = (bits(starts[0]), bits(starts[starts.len() - 1]));
+        let first = bits(starts[0]);
+        let last = bits(starts[starts.len() - 1]).max(first);
         let shift = ((last - first) as usize / starts.len()).max(1).ilog2();
         let first = first >> shift;
         let mut at = 0;

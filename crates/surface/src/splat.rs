@@ -189,13 +189,16 @@ fn sphere<S: Simd, C: Columns, const PERSPECTIVE: bool>(
     let ball = TileRays::ball(simd, item);
     let front = item.front();
     let [x0, x1, y0, y1] = item.blocks.map(usize::from);
-    for y in y0..=y1 {
-        for x in x0..=x1 {
-            let block = y * rays.side + x;
-            columns.reach(simd, block, front);
-            let new = rays.meet_ball::<S, PERSPECTIVE>(simd, (x, y), &ball);
-            columns.put(simd, block, &new, item.index);
-        }
+    // One loop: where two end is harder to foresee.
+    let (mut x, mut y) = (x0, y0);
+    for _ in 0..(x1 + 1 - x0) * (y1 + 1 - y0) {
+        let block = y * rays.side + x;
+        columns.reach(simd, block, front);
+        let new = rays.meet_ball::<S, PERSPECTIVE>(simd, (x, y), &ball);
+        columns.put(simd, block, &new, item.index);
+        let last = x == x1;
+        x = if last { x0 } else { x + 1 };
+        y += usize::from(last);
     }
 }
 

@@ -406,6 +406,27 @@ fn grids_and_arrays_give_the_same() {
 }
 
 #[test]
+fn a_particle_far_away_changes_nothing_near() {
+    let case = &cases()[6];
+    let mut positions = case.positions.clone();
+    positions.push([1e6, 1e6, 1e6]);
+    let stray = Case { positions, radii: Radii::Uniform(0.0406), ..*case };
+    let stray = Case { params: Params { cull: Cull::Occupancy, ..case.params }, ..stray };
+    assert_eq!(stray.boundary().lattice(), None);
+    assert_eq!(stray.spans(), case.spans());
+}
+
+#[test]
+fn planes_in_the_wrong_order_show_nothing() {
+    let case = &cases()[0];
+    for representation in [Representation::Intervals, Representation::Bits(Bits::default())] {
+        let params = Params { representation, ..case.params };
+        let view = View { near: 6.0, far: 0.3, ..case.view };
+        assert!(voxelize(&case.boundary(), &view, &params, Level::new()).0.is_empty());
+    }
+}
+
+#[test]
 fn nothing_gives_nothing() {
     let case = &cases()[0];
     let nothing = Case { positions: vec![], radii: Radii::Uniform(1.0), ..*case };
