@@ -1,6 +1,7 @@
 //! A system of particles seen as a liquid: from the scene's parameters to the surface renderer's, and from its
 //! picture to a frame.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fearless_simd::Level;
@@ -10,11 +11,13 @@ use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
-    Particles, Representation, Shadow, Smoothing, Spans, Surfaces, View, shade, voxelize,
+    Particles, Representation, Shadow, Smoothing, Spans, Surfaces, View, compress, connect, filter,
+    normals, shade_counted, splat, voxelize,
 };
 
 use crate::Result;
 use crate::environment::sky_of;
+use crate::paint;
 use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
@@ -28,10 +31,51 @@ const WATER: DVec3 = DVec3::new(2.6, 0.75, 0.45);
 /// Tiles of the floor over the width of what is visible.
 const TILES: f64 = 8.0;
 
+/// What a liquid is made of.
+#[derive(Clone, Copy)]
+pub(crate) struct Matter<'a> {
+    pub particles: Particles<'a>,
+    /// How many of them are visible.
+    pub visible: usize,
+    pub mean_radius: f64,
+    pub greatest_radius: f64,
+    pub paint: &'a paint::Paint,
+    /// The system's place in the scene.
+    pub system: u16,
+}
+
+impl<'a> Matter<'a> {
+    /// The particles of a system, in its grids.
+    pub fn of(system: &'a Loaded) -> Self {
+        let grids = &system.classes.grids;
+        let (sum, count) = grids.iter().fold((0.0, 0), |(sum, count), grid| {
+            let mean = f64::from(grid.least_radius + grid.greatest_radius) / 2.0;
+            (sum + mean * grid.len() as f64, count + grid.len())
+        });
+        let greatest = grids.iter().map(|g| g.greatest_radius).fold(0.0, f32::max);
+        Self {
+            particles: Particles::Grids(grids, &system.visible),
+            visible: system.count_visible(),
+            mean_radius: sum / count.max(1) as f64,
+            greatest_radius: f64::from(greatest),
+            paint: &system.paint,
+            system: system.number,
+        }
+    }
+}
+
+/// What is around a liquid, and what it casts on it.
+pub(crate) struct Setting {
+    environment: Environment,
+    lights: Lights,
+    shadow: Option<Shadow>,
+}
+
 /// What a liquid is drawn from.
+#[derive(Clone, Copy)]
 pub(crate) struct Liquid<'a> {
     pub scene: &'a Scene,
-    pub system: &'a Loaded,
+    pub matter: Matter<'a>,
     pub resolved: &'a Resolved,
     /// All that is visible, in world coordinates.
     pub bounds: Option<Bounds>,
@@ -48,48 +92,17 @@ impl Liquid<'_> {
     pub fn draw(&self, layers: bool, stats: &mut Stats) -> Result<Frame> {
         let image = &self.scene.image;
         let size = (image.width, image.height);
-        let finer = (f64::from(image.samples).sqrt().floor() as u32).max(1);
-        let Some(bounds) = self.bounds.filter(|_| self.system.count_visible() > 0) else {
+        let finer = self.finer();
+        let Some(bounds) = self.bounds.filter(|_| self.matter.visible > 0) else {
             return self.nothing(layers);
         };
         let params = self.params(layers || self.painted());
-        let start = Instant::now();
-        let input = Input {
-            particles: Particles::Grids(&self.system.classes.grids, &self.system.visible),
-            radius_scale: self.scene.surface.ball as f32,
-        };
-        let boundary = Boundary::extract(&input, &params, self.level);
-        stats.ms.insert("boundary", milliseconds(start));
-        stats.particles.insert("splatted", boundary.counts.kept);
-        stats.bytes.insert("boundary", boundary.counts.bytes);
-
-        let environment = self.environment(bounds)?;
-        let lights = self.resolved.lights.about(self.origin);
+        let boundary = self.boundary(&params, stats);
         let optics = self.optics(bounds);
-        let start = Instant::now();
-        let shadow = (lights.key.shadow_rays > 0).then(|| self.shadow(&boundary, bounds, &optics));
-        stats.ms.insert("shadow", milliseconds(start));
-        let occlusion = (lights.occlusion_rays > 0 && optics.mode != Mode::Refractive)
-            .then(|| Occlusion::new(4 * lights.occlusion_rays, self.occlusion_radius(&lights)));
-        let around = Around {
-            lights: &lights,
-            beyond: &environment,
-            shown: self.scene.surface.environment != "none" && !image.transparent,
-            shadow: shadow.as_ref(),
-            occlusion: occlusion.as_ref(),
-            paint: self.painted().then_some(self as &dyn Paint),
-            color: Vec3::from(self.scene.surface.color.linear()),
-        };
+        let setting = self.setting(bounds, (&boundary, &optics), stats)?;
         let view = self.view(bounds, finer);
         let surfaces = self.surfaces((&boundary, &params), view, stats);
-        let start = Instant::now();
-        let color = shade(&surfaces, &optics, &around);
-        let stage = match optics.mode {
-            Mode::Front => "front",
-            Mode::Translucent => "translucent",
-            Mode::Refractive => "refractive",
-        };
-        stats.ms.insert(stage, milliseconds(start));
+        let color = self.shade(&surfaces, (&optics, &setting), stats);
         let frame = Frame::new(size.0 as usize, size.1 as usize, halved(&color, size, finer))?;
         if !layers {
             return Ok(frame);
@@ -99,7 +112,76 @@ impl Liquid<'_> {
             1 => surfaces,
             _ => self.surfaces((&boundary, &params), self.view(bounds, 1), &mut Stats::default()),
         };
-        with_layers(frame, &centers, self.system.number)
+        with_layers(frame, &centers, self.matter.system)
+    }
+
+    /// Samples along a pixel's edge.
+    pub fn finer(&self) -> u32 {
+        (f64::from(self.scene.image.samples).sqrt().floor() as u32).max(1)
+    }
+
+    /// What has to be drawn, whatever the view.
+    pub fn boundary(&self, params: &Params, stats: &mut Stats) -> Boundary {
+        let start = Instant::now();
+        let radius_scale = self.scene.surface.ball as f32;
+        let input = Input { particles: self.matter.particles, radius_scale };
+        let boundary = Boundary::extract(&input, params, self.level);
+        stats.ms.insert("boundary", milliseconds(start));
+        let counts = boundary.counts;
+        stats.particles.insert("splatted", counts.kept);
+        stats.bytes.extend([("boundary", counts.bytes), ("cells", counts.cell_bytes)]);
+        boundary
+    }
+
+    /// What is around it.
+    ///
+    /// # Errors
+    /// The environment cannot be read.
+    pub fn setting(
+        &self,
+        bounds: Bounds,
+        (boundary, optics): (&Boundary, &Optics),
+        stats: &mut Stats,
+    ) -> Result<Setting> {
+        let environment = self.environment(bounds)?;
+        let lights = self.resolved.lights.about(self.origin);
+        let start = Instant::now();
+        let shadow = (lights.key.shadow_rays > 0).then(|| self.shadow(boundary, bounds, optics));
+        stats.ms.insert("shadow", milliseconds(start));
+        Ok(Setting { environment, lights, shadow })
+    }
+
+    /// The picture of surfaces.
+    pub fn shade(
+        &self,
+        surfaces: &Surfaces,
+        (optics, setting): (&Optics, &Setting),
+        stats: &mut Stats,
+    ) -> Vec<[f32; 4]> {
+        let Setting { environment, lights, shadow } = setting;
+        let start = Instant::now();
+        let occlusion = (lights.occlusion_rays > 0 && optics.mode != Mode::Refractive)
+            .then(|| Occlusion::new(4 * lights.occlusion_rays, self.occlusion_radius(lights)));
+        let around = Around {
+            lights,
+            beyond: environment,
+            shown: self.scene.surface.environment != "none" && !self.scene.image.transparent,
+            shadow: shadow.as_ref(),
+            occlusion: occlusion.as_ref(),
+            paint: self.painted().then_some(self as &dyn Paint),
+            color: Vec3::from(self.scene.surface.color.linear()),
+        };
+        let (color, work) = shade_counted(surfaces, optics, &around);
+        let stage = match optics.mode {
+            Mode::Front => "front",
+            Mode::Translucent => "translucent",
+            Mode::Refractive => "refractive",
+        };
+        stats.ms.insert(stage, milliseconds(start));
+        if optics.mode == Mode::Refractive {
+            stats.counts.extend([("rays", work.rays), ("columns", work.columns)]);
+        }
+        color
     }
 
     /// Without particles: the surroundings alone.
@@ -116,25 +198,21 @@ impl Liquid<'_> {
         let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
         let (width, height) = (image.width as usize, image.height as usize);
         let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
-        if layers { with_layers(frame, &surfaces, self.system.number) } else { Ok(frame) }
+        if layers { with_layers(frame, &surfaces, self.matter.system) } else { Ok(frame) }
     }
 
     /// Whether particles have colours of their own.
-    fn painted(&self) -> bool {
-        self.system.paint.uniform().is_none()
+    pub fn painted(&self) -> bool {
+        self.matter.paint.uniform().is_none()
     }
 
     /// The mean radius of the particles.
     fn radius(&self) -> f64 {
-        let grids = self.system.classes.grids.iter();
-        let (sum, count) = grids.fold((0.0, 0), |(sum, count), grid| {
-            let mean = f64::from(grid.least_radius + grid.greatest_radius) / 2.0;
-            (sum + mean * grid.len() as f64, count + grid.len())
-        });
-        sum / count.max(1) as f64
+        self.matter.mean_radius
     }
 
-    fn params(&self, ids: bool) -> Params {
+    /// How spans are made; with `ids`, surfaces know their particles.
+    pub fn params(&self, ids: bool) -> Params {
         let s = &self.scene.surface;
         Params {
             gap: s.gap.unwrap_or(5.0 * self.radius()) as f32,
@@ -158,7 +236,8 @@ impl Liquid<'_> {
         }
     }
 
-    fn optics(&self, bounds: Bounds) -> Optics {
+    /// What the liquid does to light.
+    pub fn optics(&self, bounds: Bounds) -> Optics {
         let s = &self.scene.surface;
         let absorption = s.absorption.unwrap_or(WATER / bounds.diagonal()).as_vec3();
         Optics {
@@ -182,7 +261,7 @@ impl Liquid<'_> {
 
     /// The camera's view, `finer` times as many pixels along each side, from what is nearest to what is
     /// farthest.
-    fn view(&self, bounds: Bounds, finer: u32) -> View {
+    pub fn view(&self, bounds: Bounds, finer: u32) -> View {
         let camera = &self.resolved.view;
         let size = (camera.width * finer, camera.height * finer);
         let whole = CameraView { width: size.0, height: size.1, ..*camera };
@@ -191,27 +270,43 @@ impl Liquid<'_> {
 
     /// Radius of the greatest ball.
     fn ball(&self) -> f64 {
-        let greatest = self.system.classes.grids.iter().map(|g| g.greatest_radius);
-        self.scene.surface.ball * f64::from(greatest.fold(0.0, f32::max))
+        self.scene.surface.ball * self.matter.greatest_radius
     }
 
-    fn surfaces(
+    /// The surfaces that a view shows: as [`voxelize`] and [`Surfaces::new`] make them, stage by stage.
+    pub fn surfaces(
         &self,
         (boundary, params): (&Boundary, &Params),
         view: View,
         stats: &mut Stats,
     ) -> Surfaces {
-        let start = Instant::now();
-        let (spans, made) = voxelize(boundary, &view, params, self.level);
-        stats.ms.insert("splat", milliseconds(start));
-        stats.bytes.insert("spans", made.span_bytes);
+        let mut timed = Laps::new(&mut stats.ms);
+        let splatted = splat(boundary, &view, params, self.level);
+        timed.lap("splat");
+        let (spans, made) = compress(&splatted);
+        drop(splatted);
+        timed.lap("compress");
+        let links = connect::connect(&spans);
+        timed.lap("connect");
+        let mut nearness = filter::nearness(&spans, view.rays.projection);
+        self.smoothing().apply(&mut nearness, (&spans, &links), &view);
+        timed.lap("filter");
+        let normals = normals::normals(&nearness, (&spans, &links), &view);
+        timed.lap("normals");
+        let bytes = [
+            ("items", made.item_bytes),
+            ("tiles", made.tile_bytes),
+            ("spans", made.span_bytes),
+            ("links", size_of_val(&links[..])),
+        ];
+        stats.bytes.extend(bytes);
+        let counts = [("tiles", made.tiles), ("items", made.items), ("spans", spans.len())];
+        stats.counts.extend(counts.map(|(name, count)| (name, count as u64)));
         if made.layers > 0 {
             stats.counts.insert("layers", made.layers as u64);
             stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
         }
-        let start = Instant::now();
-        let surfaces = Surfaces::new(spans, view, self.smoothing());
-        stats.ms.insert("filter", milliseconds(start));
+        let surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
         stats.bytes.insert("surfaces", surfaces.bytes());
         surfaces
     }
@@ -284,9 +379,27 @@ impl Liquid<'_> {
     }
 }
 
+/// Tells how long each of several stages takes, one after the other.
+struct Laps<'a> {
+    ms: &'a mut BTreeMap<&'static str, f64>,
+    start: Instant,
+}
+
+impl<'a> Laps<'a> {
+    fn new(ms: &'a mut BTreeMap<&'static str, f64>) -> Self {
+        Self { ms, start: Instant::now() }
+    }
+
+    /// Ends a stage; the next one begins.
+    fn lap(&mut self, stage: &'static str) {
+        self.ms.insert(stage, milliseconds(self.start));
+        self.start = Instant::now();
+    }
+}
+
 impl Paint for Liquid<'_> {
     fn color(&self, particle: u32) -> Vec3 {
-        self.system.paint.color(particle)
+        self.matter.paint.color(particle)
     }
 }
 

@@ -13,7 +13,7 @@ use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolve
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, Spheres, View};
 
 use crate::annotate::{Annotated, annotations};
-use crate::liquid::Liquid;
+use crate::liquid::{Liquid, Matter};
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
@@ -348,7 +348,8 @@ impl Session {
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        Liquid { scene: &self.scene, system, resolved, bounds, origin, level }.draw(layers, stats)
+        let matter = Matter::of(system);
+        Liquid { scene: &self.scene, matter, resolved, bounds, origin, level }.draw(layers, stats)
     }
 
     fn trace(

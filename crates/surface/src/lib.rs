@@ -3,7 +3,8 @@
 //! Zirr & Dachsbacher 2015, *Memory-Efficient On-The-Fly Voxelization of Particle Data*. The paper's stages:
 //!
 //! - [`Boundary`]: what has to be drawn of a liquid, whatever the view
-//! - splat and compress, [`voxelize()`]: what each pixel's ray passes of it, a short list of [`Spans`]
+//! - [`splat()`] and [`compress()`], together [`voxelize()`]: what each pixel's ray passes of it, a short list of
+//!   [`Spans`]
 //! - [`mod@connect`]: which of their ends are one surface
 //! - [`mod@filter`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
 //! - [`shade()`]: pictures, with rays that [`mod@march`] through columns
@@ -44,12 +45,12 @@ pub use blocks::Blocks;
 pub use boundary::{Boundary, BoundaryCounts};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
-pub use shade::{Around, Mode, Optics, Paint, shade};
+pub use shade::{Around, Mode, Optics, Paint, Work, shade, shade_counted};
 pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
 pub use surfaces::{Filter, Smoothing, Surfaces};
 pub use view::View;
-pub use voxelize::{Stats, voxelize};
+pub use voxelize::{Splatted, Stats, compress, splat, voxelize};
 
 #[cfg(test)]
 mod truth_tests;

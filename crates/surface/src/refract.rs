@@ -5,13 +5,15 @@
 //! internal reflection), up to a number of boundaries. What goes the other way is seen without further
 //! boundaries if it leaves the liquid, and else goes with the rest.
 
+use std::cell::Cell;
+
 use glam::{Vec3, Vec4};
 use motes_scene::{Sight, optics};
 
 use crate::Surfaces;
 use crate::blocks::Blocks;
 use crate::march::{Hit, Ray, march, march_blocks};
-use crate::shade::{Around, Optics, Pixel};
+use crate::shade::{Around, Optics, Pixel, Work};
 
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
 const PART: f32 = 0.02;
@@ -19,15 +21,25 @@ const PART: f32 = 0.02;
 /// Paths that are less than this part of a pixel's light meet nothing but the surroundings.
 const FAINT: f32 = 0.03;
 
-/// What paths go through.
+/// What paths go through, for one thread.
 pub(crate) struct Paths<'a> {
     pub surfaces: &'a Surfaces,
     pub optics: &'a Optics,
     pub around: &'a Around<'a>,
     pub blocks: Option<&'a Blocks>,
+    /// What was done so far.
+    pub work: Cell<Work>,
 }
 
-impl Paths<'_> {
+impl<'a> Paths<'a> {
+    pub fn new(
+        surfaces: &'a Surfaces,
+        (optics, around): (&'a Optics, &'a Around<'a>),
+        blocks: Option<&'a Blocks>,
+    ) -> Self {
+        Self { surfaces, optics, around, blocks, work: Cell::default() }
+    }
+
     /// The light of a pixel whose column holds a surface.
     pub fn pixel(&self, pixel: &Pixel) -> Vec4 {
         let first = self.surfaces.of(pixel.index).start;
@@ -72,10 +84,12 @@ impl Paths<'_> {
     }
 
     fn march(&self, ray: &Ray) -> Option<Hit> {
-        match self.blocks {
-            Some(blocks) => march_blocks((self.surfaces, blocks), ray).0,
-            None => march(self.surfaces, ray).0,
-        }
+        let (hit, columns) = match self.blocks {
+            Some(blocks) => march_blocks((self.surfaces, blocks), ray),
+            None => march(self.surfaces, ray),
+        };
+        self.work.set(self.work.get() + Work { rays: 1, columns: columns.into() });
+        hit
     }
 
     /// The light along a path that is a `part` of a pixel's: of a faint one, that of the surroundings.

@@ -4,6 +4,8 @@
 //! all spans of it and lets them absorb and scatter (their extended last ones, too, without what is empty in them);
 //! *refractive* follows the light, see `refract.rs`.
 
+use std::ops::Add;
+
 use glam::{Vec3, Vec4};
 use motes_scene::{Beyond, Lights, Sight, optics};
 use rayon::prelude::*;
@@ -94,14 +96,41 @@ impl Around<'_> {
     }
 }
 
+/// What the rays of a picture did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Rays that went from column to column.
+    pub rays: u64,
+    /// Columns that they looked into.
+    pub columns: u64,
+}
+
+impl Add for Work {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { rays: self.rays + other.rays, columns: self.columns + other.columns }
+    }
+}
+
 /// The picture: linear, premultiplied colours, row by row.
 pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
+    shade_counted(surfaces, optics, around).0
+}
+
+/// As [`shade`], and what was done for it.
+pub fn shade_counted(
+    surfaces: &Surfaces,
+    optics: &Optics,
+    around: &Around<'_>,
+) -> (Vec<[f32; 4]>, Work) {
     let width = surfaces.view.size.0 as usize;
     let blocks = (optics.mode == Mode::Refractive && optics.skip)
         .then(|| crate::blocks::Blocks::new(surfaces));
-    let paths = refract::Paths { surfaces, optics, around, blocks: blocks.as_ref() };
     let mut color = vec![[0.0; 4]; surfaces.view.pixels()];
-    color.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+    let rows = color.par_chunks_mut(width).enumerate();
+    let work = rows.map(|(y, row)| {
+        let paths = refract::Paths::new(surfaces, (optics, around), blocks.as_ref());
         for (x, color) in row.iter_mut().enumerate() {
             let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
             let spread = surfaces.view.rays.pixel;
@@ -114,8 +143,10 @@ pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[
             }
             .to_array();
         }
+        paths.work.get()
     });
-    color
+    let work = work.reduce(Work::default, Work::add);
+    (color, work)
 }
 
 /// A pixel and its ray.

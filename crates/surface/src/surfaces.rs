@@ -74,6 +74,11 @@ impl Surfaces {
         let mut nearness = filter::nearness(&spans, view.rays.projection);
         smoothing.apply(&mut nearness, (&spans, &links), &view);
         let normals = normals(&nearness, (&spans, &links), &view);
+        Self::of_spans(spans, view, (nearness, normals))
+    }
+
+    /// The ends of `spans`, which `view` shows, with what was found of each: nearness and normal.
+    pub fn of_spans(spans: Spans, view: View, (nearness, normals): (Vec<f32>, Vec<u32>)) -> Self {
         let Spans { starts, extended, particles, .. } = spans;
         Self { view, starts, nearness, normals, extended, particles }
     }

@@ -1,4 +1,5 @@
-//! From the boundary of a liquid to the spans of a picture, tile by tile on all cores.
+//! From the boundary of a liquid to the spans of a picture, tile by tile on all cores: [`splat`] makes the
+//! spans of each tile while its columns are in cache, [`compress`] puts those of all tiles together.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -19,6 +20,8 @@ const BITS_BYTES: usize = 1 << 24;
 /// What was done for a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stats {
+    /// Tiles of the picture.
+    pub tiles: usize,
     /// Spheres and cubes, once for each tile they touch.
     pub items: usize,
     /// Bytes of the items.
@@ -35,11 +38,33 @@ pub struct Stats {
     pub coarsened: bool,
 }
 
-/// The spans of all pixels of `view` of a liquid.
+/// The spans of all tiles of a picture, each by itself: what [`compress`] puts together.
+#[derive(Debug)]
+pub struct Splatted {
+    view: View,
+    tiles: Tiles,
+    parts: Vec<TileSpans>,
+    stats: Stats,
+}
+
+/// The spans of all pixels of `view` of a liquid: [`splat`], then [`compress`].
+pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level) -> (Spans, Stats) {
+    compress(&splat(boundary, view, params, level))
+}
+
+/// Puts the spans of all tiles together.
+pub fn compress(splatted: &Splatted) -> (Spans, Stats) {
+    let Splatted { view, tiles, parts, stats } = splatted;
+    let spans = assemble(view, tiles, parts);
+    let stats = Stats { span_bytes: spans.bytes(), ..*stats };
+    (spans, stats)
+}
+
+/// Splats a liquid into the tiles of `view`: the spans of all pixels, tile by tile.
 ///
 /// `params` is what the boundary was extracted with, but for `gap`, `spans`, `representation` and `tile`,
 /// which may differ. Bits know no particles: with them none are told.
-pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level) -> (Spans, Stats) {
+pub fn splat(boundary: &Boundary, view: &View, params: &Params, level: Level) -> Splatted {
     let layers = match &params.representation {
         Representation::Intervals => None,
         Representation::Bits(bits) => Some((Layers::new(view, bits), bits.marks)),
@@ -48,7 +73,12 @@ pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level)
     let tiles = Tiles::new(view.size, params.tile.min(most));
     let binning = Binning::new(boundary, view, &tiles, level);
     let painter = Painter { view, tiles: &tiles, cubes: &boundary.cubes, binning: &binning };
-    let mut stats = Stats { items: binning.len(), item_bytes: binning.bytes(), ..Stats::default() };
+    let mut stats = Stats {
+        tiles: tiles.count(),
+        items: binning.len(),
+        item_bytes: binning.bytes(),
+        ..Stats::default()
+    };
     let parts = match (&layers, params.ids) {
         (None, false) => exact::<false>(&painter, params, level),
         (None, true) => exact::<true>(&painter, params, level),
@@ -61,9 +91,7 @@ pub fn voxelize(boundary: &Boundary, view: &View, params: &Params, level: Level)
     }
     drop(binning);
     stats.tile_bytes = parts.iter().map(TileSpans::bytes).sum();
-    let spans = assemble(view, &tiles, &parts);
-    stats.span_bytes = spans.bytes();
-    (spans, stats)
+    Splatted { view: *view, tiles, parts, stats }
 }
 
 /// Makes all tiles with intervals.
