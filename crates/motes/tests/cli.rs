@@ -510,6 +510,40 @@ fn bench_prints_the_papers_tables() {
 }
 
 #[test]
+fn bench_of_a_surface_prints_a_line_and_tables() {
+    let folder = folder("bench-surface");
+    let size = ["bench", "surface", "--size", "48x32", "--frames", "1"];
+    let args = ["--source", "demo:dam:2000", "--json"];
+    let line: Value =
+        serde_json::from_str(&succeeds(&folder, &[&size[..], &args].concat())).unwrap();
+    let stages = [
+        "build",
+        "compress",
+        "connect",
+        "filter",
+        "first_image",
+        "frame",
+        "normals",
+        "refractive",
+        "splat",
+        "translucent",
+    ];
+    assert_eq!(line["ms"].as_object().unwrap().keys().collect::<Vec<_>>(), stages);
+    assert_eq!((&line["method"], &line["particles"]), (&"surface".into(), &2000.into()));
+    assert_eq!(line["bytes"]["input"], 24_000);
+    assert!(line["counts"]["kept"].as_u64().unwrap() > 0 && line.get("primary").is_none());
+    let text = succeeds(&folder, &[&size[..], &args[..2]].concat());
+    assert!(text.contains("refractive") && text.contains(line["hash"].as_str().unwrap()), "{text}");
+
+    let args = ["--scale", "1e-4", "--stages", "table1,view"];
+    let text = succeeds(&folder, &[&size[..], &args].concat());
+    let starts: Vec<_> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    let tiles = ["table1:", "Dataset", "16", "32", "64", "128", "256", "512"];
+    let views = ["view:", "Dataset", "(a)", "(b),", "(b),"];
+    assert_eq!(starts, [&tiles[..], &views].concat(), "{text}");
+}
+
+#[test]
 fn bench_refuses_what_makes_no_sense() {
     let folder = folder("bench-refusals");
     for (args, word) in [
@@ -519,7 +553,10 @@ fn bench_refuses_what_makes_no_sense() {
         (&["spheres", "--scale", "0"], "--scale"),
         (&["spheres", "--frames", "0"], "--frames"),
         (&["spheres", "--peer-view"], "--source"),
-        (&["surface"], "not in this version"),
+        (&["surface", "--stages", "table3"], "'table3'"),
+        (&["surface", "--source", "demo:dam:9", "--stages", "shadow16"], "'shadow16'"),
+        (&["surface", "--source", "demo:dam:9", "--set", "surface.gap=-1"], "surface.gap"),
+        (&["density"], "not in this version"),
     ] {
         let said = fails(&folder, &[&["bench"], args].concat(), 2);
         assert!(said.contains(word), "{args:?}: {said}");

@@ -1,11 +1,12 @@
-//! Measurements: the tables of Gribble et al. 2007 on sets of like size and structure, and one line for
-//! any source.
+//! Measurements: the tables of Gribble et al. 2007 on sets of like size and structure, those of Zirr &
+//! Dachsbacher 2015, and one line for any source.
 //!
 //! Every time stands beside a hash of its picture, so that a faster wrong picture shows, and what is
 //! compared is measured in turns, so that a busy machine slows all of it alike.
 //!
 //! - [`spheres_tables`]: Tables 2–9, the sweeps over λ and M, construction (`paper`, `sweeps`)
 //! - [`spheres_source`]: one source, frames of a turning camera (`source`)
+//! - [`surface_tables`], [`surface_source`]: the same for liquids (`surface`)
 //! - `draw`: one loop over packets for every way of finding what a ray hits first
 //! - `standard_grid`, `single_ray`: what the paper compares with; they live here only
 
@@ -16,6 +17,7 @@ mod shot;
 mod single_ray;
 mod source;
 mod standard_grid;
+mod surface;
 mod sweeps;
 mod table;
 #[cfg(test)]
@@ -27,6 +29,10 @@ use crate::{Error, Result};
 
 pub use paper::{STAGES as TABLES, Tables, spheres_tables};
 pub use source::{Line, STAGES, Source, peer_view, spheres_source};
+pub use surface::{
+    SOURCE_STAGES as SURFACE_STAGES, STAGES as SURFACE_TABLES, surface_defaults, surface_source,
+    surface_tables,
+};
 pub use table::{Cell, Row, Table};
 
 /// Wall milliseconds of `work`, and what came of it.

@@ -25,11 +25,11 @@ pub const STAGES: [&str; 11] = [
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Tables {
-    /// Width and height of the pictures, pixels; Table 3 also doubles them.
+    /// Width and height of the pictures, pixels; some tables also double them.
     pub size: (u32, u32),
     /// Frames of which the median counts.
     pub frames: usize,
-    /// Names of [`STAGES`]; none: all.
+    /// Names of [`STAGES`] or [`crate::bench::SURFACE_TABLES`]; none: all.
     pub stages: Vec<String>,
     /// Factor on the numbers of particles; 1 for the paper's.
     pub scale: f64,

@@ -107,7 +107,7 @@ impl Sink for Studio {
 }
 
 /// Linear, premultiplied RGBA before a dark background, as bytes: R in the lowest.
-fn pack(color: &[f32; 4]) -> u32 {
+pub(super) fn pack(color: &[f32; 4]) -> u32 {
     const BEHIND: f32 = 32.0 / 255.0;
     /// In f32 beside this number, the last eight bits count ones.
     const WHOLE: f32 = 8_388_608.0;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use motes_grid::RadiusClasses;
 use motes_particles::Particles;
-use motes_scene::{CameraView, Framing, Lights, Primary, RelativeTo, Scene};
+use motes_scene::{Framing, Primary, RelativeTo, Resolved, Scene};
 use motes_spheres::{Counts, Spheres};
 use serde::Serialize;
 
@@ -32,7 +32,7 @@ pub struct Source {
     pub scene: Scene,
     /// Frames, and builds, of which the median counts.
     pub frames: usize,
-    /// Names of [`STAGES`]; none: all.
+    /// Names of [`STAGES`] or [`crate::bench::SURFACE_STAGES`]; none: all.
     pub stages: Vec<String>,
     /// Threads; none: the machine's.
     pub threads: Option<usize>,
@@ -41,7 +41,7 @@ pub struct Source {
 /// What was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// `spheres`.
+    /// `spheres` or `surface`.
     pub method: &'static str,
     /// The source.
     pub source: String,
@@ -51,18 +51,23 @@ pub struct Line {
     pub threads: usize,
     /// Instruction set.
     pub simd: &'static str,
-    /// The way to what the eye sees first: `project` or `trace`.
-    pub primary: &'static str,
-    /// Hash of the first frame: one ray per pixel sample, packed to 8 bits.
+    /// The way to what the eye sees first: `project` or `trace`; of spheres only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primary: Option<&'static str>,
+    /// Hash of the first frame, packed to 8 bits: of spheres, one ray per pixel sample; of a surface, in the
+    /// scene's mode.
     pub hash: String,
-    /// Hashes of the first frames of `shadow16` and `ao16`.
+    /// Hashes of the first frames of `shadow16` and `ao16`, or of the surface's other modes.
     pub hashes: BTreeMap<&'static str, String>,
     /// Milliseconds by stage: medians, but for `first_image`.
     pub ms: BTreeMap<&'static str, f64>,
     /// Bytes: `input` (the source's arrays), `data` (positions and radii in the grid), `grid` (beyond
-    /// these), `visibility`, `peak` (of the process).
+    /// these), `visibility`, `peak` (of the process). Of a surface, in the order in which they come to be: `cells`
+    /// (for extraction only), `boundary`, `items` and `tiles` (for splatting only), `spans`, `links`, `surfaces`.
     pub bytes: BTreeMap<&'static str, u64>,
-    /// Counts of the first frame: `tests` (ray–sphere tests), `spheres` (culled or tested), `tested`.
+    /// Counts of the first frame: `tests` (ray–sphere tests), `spheres` (culled or tested), `tested`. Of a
+    /// surface: `kept` (particles), `cells` and `inner` ones, `tiles`, `items` splatted, `spans` stored and
+    /// `true_spans`, refracted `rays` and the `columns` they looked into.
     pub counts: BTreeMap<&'static str, u64>,
 }
 
@@ -108,31 +113,47 @@ struct Bench {
     line: Line,
 }
 
-/// A camera for a frame and the lights it brings.
-struct Pose {
-    view: CameraView,
-    lights: Lights,
+/// The frame of the first system of a scene.
+pub(super) fn read(scene: &Scene, watch: &dyn Watch) -> Result<Arc<Particles>> {
+    scene.check()?;
+    let system = scene.system.first().filter(|s| !s.source.is_empty());
+    let system = system.ok_or_else(|| Error::Usage("no source to measure".into()))?;
+    let report = |done, total| _ = watch.progress("read", done, total);
+    let mut series = crate::open(&system.source)?;
+    Ok(series.frame(scene.image.frame as usize, &wanted(system), &report)?)
+}
+
+/// A camera, and the lights it brings, for each frame and one more: the scene's, turned about its target and the
+/// way up.
+pub(super) fn poses(scene: &Scene, framing: Framing<'_>, frames: usize) -> Result<Vec<Resolved>> {
+    let first = scene.resolve_framing(framing)?.view;
+    let axis = scene.camera.up_axis.vector();
+    let pose = |frame: usize| {
+        let turn = DQuat::from_axis_angle(axis, (TURN_DEGREES * frame as f64).to_radians());
+        let mut scene = scene.clone();
+        scene.camera.target = Some(first.target);
+        scene.camera.position = Some(first.target + turn * (first.eye - first.target));
+        scene.camera.up = Some(turn * first.up);
+        scene.camera.height = Some(2.0 * first.half_height);
+        Ok(scene.resolve_framing(framing)?)
+    };
+    (0..=frames).map(pose).collect()
 }
 
 impl Bench {
     fn open(options: Source, watch: &dyn Watch) -> Result<Self> {
         let Source { scene, frames, .. } = options;
-        scene.check()?;
-        let system = scene.system.first().filter(|s| !s.source.is_empty());
-        let system = system.ok_or_else(|| Error::Usage("no source to measure".into()))?;
-        let report = |done, total| _ = watch.progress("read", done, total);
-        let mut series = crate::open(&system.source)?;
-        let particles = series.frame(scene.image.frame as usize, &wanted(system), &report)?;
+        let particles = read(&scene, watch)?;
         let line = Line {
             method: "spheres",
-            source: system.source.clone(),
+            source: scene.system[0].source.clone(),
             particles: 0,
             threads: rayon::current_num_threads(),
             simd: instruction_set(fearless_simd::Level::new()),
-            primary: match scene.spheres.primary {
+            primary: Some(match scene.spheres.primary {
                 Primary::Project => "project",
                 Primary::Trace => "trace",
-            },
+            }),
             hash: String::new(),
             hashes: BTreeMap::new(),
             ms: BTreeMap::new(),
@@ -148,7 +169,9 @@ impl Bench {
         watch.progress("build", 0, total);
         // The first of this process: nothing is warm yet.
         let (first_build, mut loaded) = self.build(RadiusClasses::default())?;
-        let poses = self.poses(&loaded)?;
+        let boxes = loaded.boxes(self.origin());
+        let framing = Framing { boxes: &boxes, free_right: 0.0 };
+        let poses = poses(&self.scene, framing, self.frames)?;
         let (first_frame, counts) = timed(|| self.draw(&loaded, &poses[0], (0, 0)));
         self.line.hash = self.studio.hash();
         self.count(&loaded, counts);
@@ -203,27 +226,8 @@ impl Bench {
         DVec3::from_array(self.particles.origin)
     }
 
-    /// A camera for each frame and one more: the scene's, turned about its target and the way up.
-    fn poses(&self, loaded: &Loaded) -> Result<Vec<Pose>> {
-        let boxes = loaded.boxes(self.origin());
-        let framing = Framing { boxes: &boxes, free_right: 0.0 };
-        let first = self.scene.resolve_framing(framing)?.view;
-        let axis = self.scene.camera.up_axis.vector();
-        let pose = |frame: usize| {
-            let turn = DQuat::from_axis_angle(axis, (TURN_DEGREES * frame as f64).to_radians());
-            let mut scene = self.scene.clone();
-            scene.camera.target = Some(first.target);
-            scene.camera.position = Some(first.target + turn * (first.eye - first.target));
-            scene.camera.up = Some(turn * first.up);
-            scene.camera.height = Some(2.0 * first.half_height);
-            let resolved = scene.resolve_framing(framing)?;
-            Ok(Pose { view: resolved.view, lights: resolved.lights })
-        };
-        (0..=self.frames).map(pose).collect()
-    }
-
     /// Draws a frame with so many shadow and occlusion rays.
-    fn draw(&self, loaded: &Loaded, pose: &Pose, rays: (u32, u32)) -> Counts {
+    fn draw(&self, loaded: &Loaded, pose: &Resolved, rays: (u32, u32)) -> Counts {
         let mut lights = pose.lights;
         (lights.key.shadow_rays, lights.occlusion_rays) = rays;
         if lights.key.shadow_rays == 0 {
@@ -245,14 +249,14 @@ impl Bench {
     fn steady(
         &mut self,
         loaded: &Loaded,
-        poses: &[Pose],
+        poses: &[Resolved],
         (stage, rays): (&'static str, (u32, u32)),
     ) -> f64 {
         self.draw(loaded, &poses[0], rays);
         if rays != (0, 0) {
             self.line.hashes.insert(stage, self.studio.hash());
         }
-        let time = |pose: &Pose| timed(|| self.draw(loaded, pose, rays)).0;
+        let time = |pose: &Resolved| timed(|| self.draw(loaded, pose, rays)).0;
         median(poses.iter().skip(1).map(time).collect())
     }
 

@@ -43,6 +43,8 @@ pub enum Cell {
     Factor(f64),
     /// Percent.
     Percent(f64),
+    /// Degrees.
+    Degrees(f64),
     /// Bytes, told in MiB.
     Bytes(usize),
     /// Not measured here.
@@ -57,6 +59,7 @@ impl Display for Cell {
             Self::Count(n) => write!(f, "{n}"),
             Self::Factor(x) => write!(f, "{x:.2}"),
             Self::Percent(x) => write!(f, "{x:.2} %"),
+            Self::Degrees(x) => write!(f, "{x:.3}°"),
             Self::Bytes(n) => write!(f, "{:.1} MiB", *n as f64 / f64::from(1 << 20)),
             Self::Missing => write!(f, "not measured"),
         }
@@ -72,7 +75,9 @@ impl Serialize for Cell {
                 map.serialize_entry("ms", ms)?;
                 map.end()
             }
-            Self::Ms(x) | Self::Factor(x) | Self::Percent(x) => serializer.serialize_f64(*x),
+            Self::Ms(x) | Self::Factor(x) | Self::Percent(x) | Self::Degrees(x) => {
+                serializer.serialize_f64(*x)
+            }
             Self::Count(n) => serializer.serialize_u64(*n),
             Self::Bytes(n) => serializer.serialize_u64(*n as u64),
             Self::Missing => serializer.serialize_none(),

@@ -221,7 +221,7 @@ fn a_source_has_all_stages_and_one_picture_whatever_the_packets() {
     assert!(shadow != ao && *shadow != lines[0].hash && *ao != lines[0].hash);
     let traced = line(|scene| scene.spheres.primary = Primary::Trace);
     assert_eq!((&traced.hash, &traced.hashes), (&lines[0].hash, &lines[0].hashes));
-    assert_eq!((lines[0].primary, traced.primary), ("project", "trace"));
+    assert_eq!((lines[0].primary, traced.primary), (Some("project"), Some("trace")));
     let moved = line(|scene| scene.camera.fov = 30.0);
     assert_ne!(moved.hash, lines[0].hash);
 }

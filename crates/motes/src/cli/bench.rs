@@ -1,6 +1,9 @@
 //! `motes bench`: the papers' tables, or one line for a source.
 
-use motes::bench::{Line, Source, Table, Tables, peer_view, spheres_source, spheres_tables};
+use motes::bench::{
+    Line, Source, Table, Tables, peer_view, spheres_source, spheres_tables, surface_defaults,
+    surface_source, surface_tables,
+};
 use motes::{Error, Scene};
 
 use super::meter::Meter;
@@ -12,19 +15,21 @@ const EXAMPLES: &str = "\
 Examples:
   motes bench spheres                                    the paper's tables: minutes and 4 GB
   motes bench spheres --scale 0.1 --stages table2,table4 some of them, on smaller sets
-  motes bench spheres --source demo:dam:1e6 --peer-view --json";
+  motes bench spheres --source demo:dam:1e6 --peer-view --json
+  motes bench surface --scale 0.1 --stages table2,fig8   liquids: the paper's views, on smaller sets
+  motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
 pub(crate) struct Args {
-    /// The way of seeing: spheres
+    /// The way of seeing: spheres or surface
     #[arg(value_name = "METHOD", hide_possible_values = true)]
     method: Method,
     /// Measure this source; without it, the paper's sets
     #[arg(long, value_name = "SOURCE")]
     source: Option<String>,
-    /// Pixels, or 720p, 1080p, 1440p, 4k, 8k [default: 1024x1024]
+    /// Pixels, or 720p, 1080p, 1440p, 4k, 8k [default: 1024x1024; surface: 1080p]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Frames of which the median counts
@@ -55,7 +60,6 @@ pub(crate) struct Args {
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
 enum Method {
     Spheres,
-    #[value(hide = true)]
     Surface,
     #[value(hide = true)]
     Density,
@@ -63,13 +67,26 @@ enum Method {
     Sections,
 }
 
-/// Pixels along the sides of a picture where nothing is said: the paper's (§5).
-const SIDE: u32 = 1024;
+impl Method {
+    fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+
+    /// Pixels of a picture where nothing is said: the papers' (§5 of both).
+    fn size(self) -> [u32; 2] {
+        match self {
+            Self::Surface => [1920, 1080],
+            _ => [1024; 2],
+        }
+    }
+}
 
 pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
-    if args.method != Method::Spheres {
-        let name = format!("{:?}", args.method).to_lowercase();
-        return Err(Failure::usage(format!("bench {name}: not in this version; there is spheres")));
+    if !matches!(args.method, Method::Spheres | Method::Surface) {
+        let name = args.method.name();
+        return Err(Failure::usage(format!(
+            "bench {name}: not in this version; there are spheres and surface"
+        )));
     }
     if args.frames == 0 {
         return Err(Failure::usage("--frames 0: expected 1 or more"));
@@ -83,11 +100,18 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
                 stages: args.stages.clone(),
                 threads: args.threads,
             };
-            let line = spheres_source(options, &meter)?;
+            let line = match args.method {
+                Method::Surface => surface_source(options, &meter)?,
+                _ => spheres_source(options, &meter)?,
+            };
             if args.json { json(&line)? } else { one_line(&line) }
         }
         None => {
-            let tables = spheres_tables(&args.tables()?, &meter)?;
+            let options = args.tables()?;
+            let tables = match args.method {
+                Method::Surface => surface_tables(&options, &meter)?,
+                _ => spheres_tables(&options, &meter)?,
+            };
             let text = || tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n");
             if args.json { json(&tables)? } else { text() }
         }
@@ -108,8 +132,8 @@ impl Args {
         if !(scale > 0.0 && scale <= 10.0) {
             return Err(Failure::usage(format!("--scale {scale}: expected above 0, at most 10")));
         }
-        let [width, height] = self.size.unwrap_or([SIDE; 2]);
-        // Table 3 doubles it, and no scene has more pixels than it can have.
+        let [width, height] = self.size.unwrap_or(self.method.size());
+        // Some tables double it, and no scene has more pixels than it can have.
         let mut scene = Scene::default();
         (scene.image.width, scene.image.height) =
             (width.saturating_mul(2), height.saturating_mul(2));
@@ -123,12 +147,15 @@ impl Args {
         })
     }
 
-    /// The scene of a source: one sample per pixel, then what was typed.
+    /// The scene of a source: one sample per pixel, of a surface no shadows and no occlusion, then what was typed.
     fn scene(&self, source: &str) -> Result<Scene, Failure> {
         let mut scene = Scene::default();
         scene.set_sources(&[source.into()]);
-        [scene.image.width, scene.image.height] = self.size.unwrap_or([SIDE; 2]);
+        [scene.image.width, scene.image.height] = self.size.unwrap_or(self.method.size());
         scene.image.samples = 1;
+        if self.method == Method::Surface {
+            surface_defaults(&mut scene);
+        }
         if self.peer_view {
             peer_view(&mut scene);
         }
@@ -148,18 +175,18 @@ fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
 /// A line for people.
 fn one_line(line: &Line) -> String {
     let ms: Vec<_> = line.ms.iter().map(|(name, ms)| format!("{name} {} ms", short(*ms))).collect();
-    let bytes = |name| line.bytes.get(name).copied().unwrap_or(0) as f64 / f64::from(1 << 20);
+    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let bytes: Vec<_> =
+        line.bytes.iter().map(|(name, bytes)| format!("{name} {:.1} MiB", mib(*bytes))).collect();
+    let primary = line.primary.map_or_else(String::new, |primary| format!(", {primary}"));
     format!(
-        "{}: {} particles, {} threads, {}, {}: {}; {:.1} MiB + {:.1} MiB for {:.1} MiB of input; {}\n",
+        "{}: {} particles, {} threads, {}{primary}: {}; {}; {}\n",
         line.source,
         line.particles,
         line.threads,
         line.simd,
-        line.primary,
         ms.join(", "),
-        bytes("data"),
-        bytes("grid") + bytes("visibility"),
-        bytes("input"),
+        bytes.join(", "),
         line.hash
     )
 }
