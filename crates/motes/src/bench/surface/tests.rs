@@ -93,7 +93,8 @@ fn finer_layers_have_normals_nearer_to_the_exact_ones() {
 
 #[test]
 fn more_layers_than_are_stored_keep_their_thickness() {
-    let rows = table("fig8", 1e-3).rows;
+    // With fewer particles the sheets have holes.
+    let rows = table("fig8", 1e-2).rows;
     for row in &rows {
         let [seen, stored, most, off] = [0, 1, 2, 3].map(|i| number(&row.values[i]));
         assert!(stored <= 7.0 && stored < seen && most > 7.0, "{row:?}");
