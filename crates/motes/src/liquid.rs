@@ -10,7 +10,7 @@ use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
-    Particles, Representation, Shadow, Smoothing, Spans, Surfaces, View, shade, voxelize,
+    Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, shade, voxelize,
 };
 
 use crate::Result;
@@ -145,6 +145,11 @@ impl Liquid<'_> {
                 Culling::Off => Cull::Off,
             },
             cell: s.cull_cell as f32,
+            spray: match s.spray {
+                surface::Spray::Keep if s.drop == s.ball => Spray::Liquid,
+                surface::Spray::Keep => Spray::Drops((s.drop / s.ball) as f32),
+                surface::Spray::Drop => Spray::Dropped,
+            },
             representation: match s.representation {
                 surface::Representation::Intervals => Representation::Intervals,
                 surface::Representation::Bits => Representation::Bits(Bits {

@@ -54,7 +54,13 @@ fn layers_agree_with_each_other() {
 
 #[test]
 fn without_gap_and_smoothing_it_is_the_spheres() {
-    let still = ["surface.smoothing=0", "surface.gap=0", "surface.ball=1", "surface.cull=off"];
+    let still = [
+        "surface.smoothing=0",
+        "surface.gap=0",
+        "surface.ball=1",
+        "surface.drop=1",
+        "surface.cull=off",
+    ];
     let surface = render(&still, 2);
     let spheres = render(&[&still[..], &["renderer=spheres", "light.preset=flat"]].concat(), 2);
     let (a, b) = (numbers(&surface, "depth"), numbers(&spheres, "depth"));
@@ -69,6 +75,20 @@ fn without_gap_and_smoothing_it_is_the_spheres() {
     }
     let all = b.iter().filter(|d| d.is_finite()).count();
     assert!(hits * 1000 > all * 995, "{hits} of {all}");
+}
+
+#[test]
+fn spray_is_drops_or_left_out() {
+    let count = |spray| {
+        let picture = render(&[spray], 2);
+        let kept = picture.stats.particles["splatted"];
+        (kept, numbers(&picture, "thickness").iter().sum::<f64>())
+    };
+    let (kept, volume) = count("surface.drop=2");
+    let (smaller, less) = count("surface.drop=1.24");
+    let (fewer, least) = count("surface.spray=drop");
+    assert!(kept == smaller && fewer < kept, "{kept} {smaller} {fewer}");
+    assert!(least < less && less < volume, "{least} {less} {volume}");
 }
 
 #[test]

@@ -43,7 +43,7 @@ mod voxelize;
 pub use blocks::Blocks;
 pub use boundary::{Boundary, BoundaryCounts};
 pub use occlusion::Occlusion;
-pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation};
+pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation, Spray};
 pub use shade::{Around, Mode, Optics, Paint, shade};
 pub use shadow::Shadow;
 pub use spans::{Extended, Spans};

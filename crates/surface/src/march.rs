@@ -272,10 +272,7 @@ impl<C: Columns> Walk<'_, C> {
         let away = end < q;
         loop {
             let next = if away { Some(count) } else { count.checked_sub(1) };
-            let Some(next) = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))
-            else {
-                return None;
-            };
+            let next = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))?;
             count = if away { count + 1 } else { count - 1 };
             if (count % 2 == 1) != self.ray.inside {
                 let u = (list[next] - self.line.start[2]) / self.line.change[2];
