@@ -38,6 +38,21 @@ fn the_picture_is_the_same_however_it_is_made() {
 }
 
 #[test]
+fn finer_pixels_are_means() {
+    // A pixel of four is the mean of the four of a picture twice as large, where anything is to be seen.
+    let color = |assignments: &[&str]| render(assignments, 2).raw.color().to_vec();
+    let fine = color(&["image.width=320", "image.height=240"]);
+    let mean = |i: usize| {
+        let [x, y] = [2 * (i % 160), 2 * (i / 160)];
+        let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+        four.map(|(x, y)| fine[y * 320 + x][0]).iter().sum::<f32>() / 4.0
+    };
+    let found = color(&["image.samples=4"]);
+    let off = (0..160 * 120).filter(|i| (found[*i][0] - mean(*i)).abs() > 0.1).count();
+    assert!(off < 160 * 120 / 500, "{off}");
+}
+
+#[test]
 fn layers_agree_with_each_other() {
     let picture = render(&[], 2);
     let (depth, id) = (numbers(&picture, "depth"), numbers(&picture, "id"));

@@ -51,7 +51,7 @@ settings! {
         /// Colour of the liquid where it is opaque or scatters, unless particles have colours.
         color: Color = Color::hex(0x3f86b8),
         /// Boundaries that light goes on from after the first, in refractive mode.
-        depth: u32 = 4,
+        depth: u32 = 2,
         /// Whether rays skip what blocks of columns have in common. Changes the speed, never the picture.
         skip: bool = true,
         /// What is around: sky (a bright day over a tiled floor), none (the background), or the path of an image of all directions (.hdr, .exr, .png).

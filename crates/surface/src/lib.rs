@@ -44,7 +44,7 @@ pub use blocks::Blocks;
 pub use boundary::{Boundary, BoundaryCounts};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation, Spray};
-pub use shade::{Around, Mode, Optics, Paint, shade};
+pub use shade::{Around, Mode, Optics, Paint, shade, shade_finer};
 pub use shadow::Shadow;
 pub use spans::{Extended, Spans};
 pub use surfaces::{Filter, Smoothing, Surfaces};

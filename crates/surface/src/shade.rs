@@ -9,9 +9,9 @@ use motes_scene::{Beyond, Lights, Sight, optics};
 use rayon::prelude::*;
 
 use crate::occlusion::Occlusion;
-use crate::refract;
+use crate::refract::Paths;
 use crate::shadow::Shadow;
-use crate::{Spans, Surfaces};
+use crate::{Blocks, Spans, Surfaces};
 
 /// How the liquid is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,25 +97,95 @@ impl Around<'_> {
 /// The picture: linear, premultiplied colours, row by row.
 pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
     let width = surfaces.view.size.0 as usize;
-    let blocks = (optics.mode == Mode::Refractive && optics.skip)
-        .then(|| crate::blocks::Blocks::new(surfaces));
-    let paths = refract::Paths { surfaces, optics, around, blocks: blocks.as_ref() };
+    let shader = Shader::new(surfaces, optics);
     let mut color = vec![[0.0; 4]; surfaces.view.pixels()];
     color.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        row.iter_mut().enumerate().for_each(|(x, color)| *color = shader.color([x, y], around));
+    });
+    color
+}
+
+/// A picture of fewer pixels: each is the mean of `finer`² of the surfaces', or, where it differs little from
+/// all eight around it, the first of them.
+pub fn shade_finer(
+    surfaces: &Surfaces,
+    optics: &Optics,
+    around: &Around<'_>,
+    finer: u32,
+) -> Vec<[f32; 4]> {
+    let finer = finer.max(1) as usize;
+    let [width, height] =
+        [surfaces.view.size.0 as usize / finer, surfaces.view.size.1 as usize / finer];
+    let shader = Shader::new(surfaces, optics);
+    let mut first = vec![[0.0; 4]; width * height];
+    first.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
         for (x, color) in row.iter_mut().enumerate() {
-            let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
-            let spread = surfaces.view.rays.pixel;
-            let pixel = Pixel { index: y * width + x, place: [x, y], origin, direction, spread };
-            *color = match (surfaces.of(pixel.index).is_empty(), optics.mode) {
-                (true, _) => nothing(&pixel, around),
-                (_, Mode::Front) => front(surfaces, &pixel, around),
-                (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
-                (_, Mode::Refractive) => paths.pixel(&pixel),
+            *color = shader.color([x * finer, y * finer], around);
+        }
+    });
+    if finer == 1 {
+        return first;
+    }
+    let mean = |[x, y]: [usize; 2]| {
+        let mut sum = Vec4::from_array(first[y * width + x]);
+        for i in 1..finer * finer {
+            let place = [x * finer + i % finer, y * finer + i / finer];
+            sum += Vec4::from_array(shader.color(place, around));
+        }
+        (sum / (finer * finer) as f32).to_array()
+    };
+    let mut color = first.clone();
+    color.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
+        for (x, color) in row.iter_mut().enumerate() {
+            let xs = x.saturating_sub(1)..(x + 2).min(width);
+            let near = (y.saturating_sub(1)..(y + 2).min(height))
+                .flat_map(|y| xs.clone().map(move |x| y * width + x));
+            if near.into_iter().any(|i| differ(first[i], first[y * width + x])) {
+                *color = mean([x, y]);
             }
-            .to_array();
         }
     });
     color
+}
+
+/// Whether two colours differ to the eye, whose scale is nearly that of square roots.
+fn differ(a: [f32; 4], b: [f32; 4]) -> bool {
+    const SEEN: f32 = 0.03;
+    (0..4).any(|i| (a[i].clamp(0.0, 1.0).sqrt() - b[i].clamp(0.0, 1.0).sqrt()).abs() > SEEN)
+}
+
+/// What pixels are shaded with.
+struct Shader<'a> {
+    surfaces: &'a Surfaces,
+    optics: &'a Optics,
+    blocks: Option<Blocks>,
+}
+
+impl<'a> Shader<'a> {
+    fn new(surfaces: &'a Surfaces, optics: &'a Optics) -> Self {
+        let blocks =
+            (optics.mode == Mode::Refractive && optics.skip).then(|| Blocks::new(surfaces));
+        Self { surfaces, optics, blocks }
+    }
+
+    /// The colour of the pixel (x, y) of the surfaces' view.
+    fn color(&self, place: [usize; 2], around: &Around<'_>) -> [f32; 4] {
+        let Self { surfaces, optics, blocks } = self;
+        let [x, y] = place;
+        let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
+        let spread = surfaces.view.rays.pixel;
+        let index = y * surfaces.view.size.0 as usize + x;
+        let pixel = Pixel { index, place, origin, direction, spread };
+        match (surfaces.of(index).is_empty(), optics.mode) {
+            (true, _) => nothing(&pixel, around),
+            (_, Mode::Front) => front(surfaces, &pixel, around),
+            (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
+            (_, Mode::Refractive) => {
+                Paths { surfaces, optics, around, blocks: blocks.as_ref() }.pixel(&pixel)
+            }
+        }
+        .to_array()
+    }
 }
 
 /// A pixel and its ray.
