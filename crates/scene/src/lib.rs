@@ -45,7 +45,7 @@ pub use motion::Moment;
 pub use resolve::{Background, Resolved};
 pub use scene::{
     Axis, Camera, ColorBy, Coloring, Component, Film, Filter, Image, Keyframe, Light, Overlay,
-    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Scene, Show, Spheres, System,
-    Tone,
+    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Scene, Show, Solver, Sph, Spheres,
+    System, Tone,
 };
 pub use settings::{Field, Setting, Shape};
