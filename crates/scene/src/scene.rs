@@ -257,13 +257,13 @@ settings! {
         density: f64 = 1000.0,
         /// Kinematic viscosity, m²/s; water has 1e-6.
         viscosity: f64 = 1e-6,
-        /// Numerical viscosity, as Monaghan's α: smooths what the particles cannot resolve.
+        /// Numerical viscosity, as Monaghan's α with sound_speed (dfsph too): smooths what the particles cannot resolve.
         smoothing: f64 = 0.05,
         /// Surface tension, N/m; water has 0.072.
         surface_tension: f64 = 0.0,
         /// Gravity, m/s².
         gravity: DVec3 = DVec3::new(0.0, 0.0, -9.81),
-        /// wcsph: speed of sound, m/s; none: ten times that of a free fall through the liquid.
+        /// Speed of sound of wcsph, m/s; none: ten times that of a free fall through the liquid.
         sound_speed: Option<f64> = None => "44.0",
         /// dfsph: mean compression at which iterations end, as a part of the density.
         tolerance: f64 = 0.001,

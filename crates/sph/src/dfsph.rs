@@ -1,19 +1,23 @@
 //! The divergence-free solver (Bender & Koschier 2015, *Divergence-Free Smoothed Particle
-//! Hydrodynamics*): two solvers for the pressure that is lacking, one so that nothing becomes denser in
-//! this step's velocities, one so that nothing is too dense at its end.
+//! Hydrodynamics*): two solvers for pressure, one so that velocities make nothing too dense, one so that
+//! nothing is too dense at the end of the step.
 //!
 //! With ∇W = −C t d (see [`crate::kernel`]) and s = Δt p/ρ², the pressures' work on the velocities is
 //! v_i += m C Σ_j t (s_i + s_j) d, which changes the rate of density of i itself, per s_i, by
-//! −(m C)² (|Σ t d|² + Σ t² r²): their factor α (Eq. 8–11). Each iteration (Alg. 3, 4) is one of Jacobi's:
+//! −(m C)² (G·(G + G_w) + Σ t² r²), G = Σ t d and G_w its part by walls: their factor α (Eq. 8–11). Each iteration (Alg. 3, 4) is one of Jacobi's:
 //! s_i += ω R_i / (m C)² (…), R the rate to be got rid of:
 //!
-//! | solver | R |
-//! |---|---|
-//! | divergence | dρ/dt |
-//! | density | dρ/dt + (ρ − ρ₀)/Δt |
+//! | solver | R | what it changes |
+//! |---|---|---|
+//! | velocity | dρ/dt + min(ρ − ρ₀, 0)/Δt | velocities |
+//! | place | dρ/dt + (ρ − ρ₀)/Δt | how particles move in this step |
 //!
-//! It is kept from pulling (s ≥ 0) as a whole rather than iteration by iteration, so that a start with the
-//! last step's pressures can be taken back where it was too much.
+//! In the paper both change the velocities. What is done against a density that is already too great would
+//! then stay as speed, and energy come from nothing; here it moves the particles and is forgotten. And what
+//! is still too thin may become denser, as far as ρ₀: spray falls together again.
+//!
+//! Pressure is kept from pulling (s ≥ 0) as a whole rather than iteration by iteration, so that a start with
+//! the last step's can be taken back where it was too much.
 
 use rayon::prelude::*;
 
@@ -29,45 +33,68 @@ const RELAXATION: f32 = 0.5;
 const WARM: f32 = 0.9;
 
 
+/// The part of the tolerance at which velocities are right: what is wrong with them stays.
+const VELOCITY: f64 = 0.3;
+/// The part of the tolerance at which places are right, as densities are not quite linear in them.
+const PLACE: f64 = 0.7;
+/// Iterations at the least.
+const LEAST: u64 = 1;
+
 /// Which of the two solvers, and its place in [`Fluid::warm`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Aim {
-    Density = 0,
-    Divergence = 1,
+    Velocity = 0,
+    Place = 1,
 }
 
 impl Simulation {
     /// A step of the divergence-free solver.
     pub(crate) fn divergence_free(&mut self, secs: f32) -> Greatest {
+        // By rate, not by step: what is left over in each of many short steps would add up.
+        let share = f64::from(secs) / self.longest_step();
+        let tolerance = VELOCITY * share.min(1.0) * self.physics.sph.tolerance;
         let (around, fluid, physics, stats) = self.parts();
         factors(around, fluid, physics);
-        stats.iterations[1] += solve(Aim::Divergence, around, fluid, physics, secs).0;
         let acceleration = forces(around, fluid, physics, secs);
-        let (iterations, compression) = solve(Aim::Density, around, fluid, physics, secs);
-        stats.iterations[0] += iterations;
-        stats.compression = compression;
+        let first = solve(Aim::Velocity, around, fluid, physics, (secs, tolerance));
+        for (row, velocity) in fluid.motion.iter_mut().zip(&fluid.velocity) {
+            row.clone_from(velocity);
+        }
+        let second = solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
+        stats.iterations = [stats.iterations[0] + first.0, stats.iterations[1] + second.0];
+        stats.compression = second.1;
         Greatest { acceleration, ..Self::move_on(fluid, physics, secs) }
     }
 }
 
-/// Density, and 1/((m C)² (|Σ t d|² + Σ t² r²)).
+impl Fluid {
+    /// What a solver changes.
+    fn aim(&mut self, aim: Aim) -> &mut [Vec<f32>; 3] {
+        match aim {
+            Aim::Velocity => &mut self.velocity,
+            Aim::Place => &mut self.motion,
+        }
+    }
+}
+
+/// Density, and 1/((m C)² (…)).
 fn factors(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
-    let [a, b, c, d, e, ..] = &mut sums;
-    let outputs = [&mut a[..n], &mut b[..n], &mut c[..n], &mut d[..n], &mut e[..n]];
-    around.of(fluid, physics).sum(Factors, [], outputs);
+    around.of(fluid, physics).sum(Factors, [], sums.each_mut().map(|row| &mut row[..n]));
     let scale = physics.mass * physics.kernel.value;
     let slope = physics.mass * physics.kernel.slope;
     // Where there is hardly a neighbour, as much is due to it as to one two thirds of the support away.
     let least = (2.0 / 3.0 * physics.kernel.support / 27.0).powi(2);
-    let [a, b, c, d, e] = [a, b, c, d, e].map(|row| row[..n].par_chunks(CHUNK));
-    let rows = (fluid.density[..n].par_chunks_mut(CHUNK), fluid.factor[..n].par_chunks_mut(CHUNK));
-    (rows, (a, b, c, d, e)).into_par_iter().for_each(|((density, factor), (a, b, c, d, e))| {
+    let rows = fluid.density[..n].par_chunks_mut(CHUNK).zip(fluid.factor[..n].par_chunks_mut(CHUNK));
+    rows.enumerate().for_each(|(chunk, (density, factor))| {
+        let part = chunk * CHUNK..chunk * CHUNK + density.len();
+        let [a, all @ .., e] = sums.each_ref().map(|row| &row[part.clone()]);
         for i in 0..density.len() {
             density[i] = scale * (1.0 + a[i]);
-            let sum = b[i] * b[i] + c[i] * c[i] + d[i] * d[i] + e[i];
-            factor[i] = 1.0 / (slope * slope * sum.max(least));
+            // What a wall does counts twice in what it does to the particle.
+            let own: f32 = (0..3).map(|k| all[k][i] * (all[k][i] + all[k + 3][i])).sum();
+            factor[i] = 1.0 / (slope * slope * (own + e[i]).max(least));
         }
     });
     fluid.sums = sums;
@@ -94,7 +121,7 @@ fn solve(
     around: Around<'_>,
     fluid: &mut Fluid,
     physics: &Physics,
-    secs: f32,
+    (secs, tolerance): (f32, f64),
 ) -> (u64, f64) {
     let n = fluid.count;
     let unit = secs / (physics.density * physics.density);
@@ -107,17 +134,16 @@ fn solve(
             *s = *total;
         }
     });
-    push(around, fluid, physics);
+    push(aim, around, fluid, physics);
     let mut iterations = 0;
     let mut compression;
-    let least = if aim == Aim::Density { 2 } else { 1 };
     loop {
         compression = correct(aim, around, fluid, physics, secs);
-        let enough = iterations >= least && compression <= physics.sph.tolerance;
+        let enough = iterations >= LEAST && compression <= tolerance;
         if enough || iterations >= u64::from(physics.sph.iterations) {
             break;
         }
-        push(around, fluid, physics);
+        push(aim, around, fluid, physics);
         iterations += 1;
     }
     // What was found last has not been tried.
@@ -140,7 +166,8 @@ fn correct(
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let sum = &mut sums[0];
-    let inputs = fluid.velocity.each_ref().map(|row| &row[..]);
+    let rows = if aim == Aim::Velocity { &fluid.velocity } else { &fluid.motion };
+    let inputs = rows.each_ref().map(|row| &row[..]);
     around.of(fluid, physics).sum(Divergence, inputs, [&mut sum[..n]]);
     let slope = physics.mass * physics.kernel.slope;
     let rest = physics.density;
@@ -154,10 +181,9 @@ fn correct(
         .map(|(total, s, (sum, density), factor)| {
             let mut excess = 0.0;
             for i in 0..total.len() {
-                let mut rate = -slope * sum[i];
-                if aim == Aim::Density {
-                    rate += (density[i] - rest) / secs;
-                }
+                let excess_now = density[i] - rest;
+                let counted = if aim == Aim::Place { excess_now } else { excess_now.min(0.0) };
+                let rate = counted / secs - slope * sum[i];
                 let next = (total[i] + RELAXATION * rate * factor[i]).max(0.0);
                 s[i] = next - total[i];
                 excess += f64::from((s[i] / (RELAXATION * factor[i]) * secs / rest).abs());
@@ -170,15 +196,15 @@ fn correct(
     parts.iter().sum::<f64>() / n.max(1) as f64
 }
 
-/// Lets what stands in [`Fluid::pressure`] push the velocities.
-fn push(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
+/// Lets what stands in [`Fluid::pressure`] push.
+fn push(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let [a, b, c, ..] = &mut sums;
     let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
     around.of(fluid, physics).sum(Push, [&fluid.pressure], outputs);
     let scale = physics.mass * physics.kernel.slope;
-    for (row, sum) in fluid.velocity.iter_mut().zip([a, b, c]) {
+    for (row, sum) in fluid.aim(aim).iter_mut().zip([a, b, c]) {
         row[..n].par_chunks_mut(CHUNK).zip(sum[..n].par_chunks(CHUNK)).for_each(|(row, sum)| {
             row.iter_mut().zip(sum).for_each(|(v, sum)| *v += scale * sum);
         });

@@ -19,8 +19,10 @@ pub(crate) struct Fluid {
     pub position: [Vec<f32>; 3],
     /// Metres per second.
     pub velocity: [Vec<f32>; 3],
-    /// What the last step's pressures were, to begin the next with, pascals: against compression and
-    /// against the rate of it ([`crate::dfsph`]).
+    /// How fast it moves in this step ([`crate::dfsph`]; else by its velocity, and this is empty).
+    pub motion: [Vec<f32>; 3],
+    /// What the last step's pressures were, to begin the next with, pascals: of velocities and of places
+    /// ([`crate::dfsph`]).
     pub warm: [Vec<f32>; 2],
     /// The particle's number, in the order in which they came.
     pub id: Vec<u32>,
@@ -31,7 +33,7 @@ pub(crate) struct Fluid {
     /// What a pressure of 1 does to a particle's own rate of density, inverse ([`crate::dfsph`]).
     pub factor: Vec<f32>,
     /// Sums of the pass at work.
-    pub sums: [Vec<f32>; 7],
+    pub sums: [Vec<f32>; 8],
     order: Order,
     spare: Vec<f32>,
     spare_id: Vec<u32>,

@@ -80,12 +80,13 @@ impl Pair<0, 7> for DensityAndMask {
     }
 }
 
-/// Σ W / A, the vector Σ t d, and Σ (t r)² over the liquid: what DFSPH's factor is made of.
+/// Σ W / A, the vector Σ t d over all, the same over walls, and Σ (t r)² over the liquid: what DFSPH's
+/// factor is made of.
 #[derive(Clone, Copy)]
 pub(crate) struct Factors;
 
-impl Pair<0, 5> for Factors {
-    const SIGN: [f32; 5] = [1.0, -1.0, -1.0, -1.0, 1.0];
+impl Pair<0, 8> for Factors {
+    const SIGN: [f32; 8] = [1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0];
 
     #[inline(always)]
     fn pair<S: Simd>(
@@ -93,9 +94,11 @@ impl Pair<0, 5> for Factors {
         at: Apart<S>,
         _: [f32x16<S>; 0],
         _: [f32x16<S>; 0],
-    ) -> [f32x16<S>; 5] {
+    ) -> [f32x16<S>; 8] {
         let t = cube(at.w);
-        [shape(at.w), t * at.d[0], t * at.d[1], t * at.d[2], t * t * at.square]
+        let zero = f32x16::splat(at.w.token(), 0.0);
+        let [x, y, z] = [t * at.d[0], t * at.d[1], t * at.d[2]];
+        [shape(at.w), x, y, z, zero, zero, zero, t * t * at.square]
     }
 
     #[inline(always)]
@@ -104,10 +107,11 @@ impl Pair<0, 5> for Factors {
         at: Apart<S>,
         _: [f32x16<S>; 0],
         weight: f32x16<S>,
-    ) -> [f32x16<S>; 5] {
+    ) -> [f32x16<S>; 8] {
         let t = cube(at.w) * weight;
         let zero = f32x16::splat(at.w.token(), 0.0);
-        [shape(at.w) * weight, t * at.d[0], t * at.d[1], t * at.d[2], zero]
+        let [x, y, z] = [t * at.d[0], t * at.d[1], t * at.d[2]];
+        [shape(at.w) * weight, x, y, z, x, y, z, zero]
     }
 }
 
@@ -153,7 +157,7 @@ impl Pair<4, 3> for Force {
         i: [f32x16<S>; 4],
         weight: f32x16<S>,
     ) -> [f32x16<S>; 3] {
-        let push = cube(at.w) * weight * i[0];
+        let push = cube(at.w) * weight * (i[0] + i[0]);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
 }
@@ -214,7 +218,7 @@ impl Pair<1, 3> for Push {
         i: [f32x16<S>; 1],
         weight: f32x16<S>,
     ) -> [f32x16<S>; 3] {
-        let push = cube(at.w) * weight * i[0];
+        let push = cube(at.w) * weight * (i[0] + i[0]);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
 }

@@ -127,11 +127,11 @@ fn passes_are_sums_over_all_pairs() {
     let slow = case.slow(
         |d, w, _, _| {
             let [a, b, c, e] = factors(d, w, 1.0);
-            [a, b, c, e, b * b + c * c + e * e]
+            [a, b, c, e, 0.0, 0.0, 0.0, b * b + c * c + e * e]
         },
         |d, w, _, weight| {
             let [a, b, c, e] = factors(d, w, weight);
-            [a, b, c, e, 0.0]
+            [a, b, c, e, b, c, e, 0.0]
         },
     );
     assert_near(&case.fast(Factors, level), &slow, TOLERANCE);
@@ -145,7 +145,7 @@ fn passes_are_sums_over_all_pairs() {
 
     let slow = case.slow(
         |d, w, i, j| d.map(|d| w.powi(3) * (i[0] + j[0]) * d),
-        |d, w, i, weight| d.map(|d| w.powi(3) * weight * i[0] * d),
+        |d, w, i, weight| d.map(|d| 2.0 * w.powi(3) * weight * i[0] * d),
     );
     assert_near(&case.fast(Push, level), &slow, TOLERANCE);
 }
@@ -162,7 +162,7 @@ fn forces_are_sums_over_all_pairs() {
                 t * ((i[0] + j[0]) * d[a] - drag) - f64::from(0.3f32) * shape(w) * d[a]
             })
         },
-        |d, w, i, weight| d.map(|d| w.powi(3) * weight * i[0] * d),
+        |d, w, i, weight| d.map(|d| 2.0 * w.powi(3) * weight * i[0] * d),
     );
     assert_near(&case.fast(force, Level::new()), &slow, TOLERANCE);
 }

@@ -1,7 +1,7 @@
 //! A simulation: from frame to frame, in steps as large as the solver allows.
 //!
 //! Time steps (Monaghan 1992, §10.3; lengths in spacings Δ, λ the `cfl`): Δt ≤ λ Δ / v_max, v_max + c for
-//! wcsph; Δt ≤ λ √(Δ / a_max) for the greatest acceleration; Δt ≤ Δ² / (4 ν). What is left of a frame is
+//! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν). What is left of a frame is
 //! divided evenly.
 
 use fearless_simd::Level;
@@ -56,7 +56,7 @@ pub struct Stats {
     pub step_secs: f64,
     /// Particles there are.
     pub particles: usize,
-    /// Iterations of the dfsph solvers in all: against compression, and against its rate.
+    /// Iterations of the dfsph solvers in all: of velocities, and of places.
     pub iterations: [u64; 2],
     /// Mean error of the densities that the last step foresaw (wcsph: compression), as a part of the
     /// density.
@@ -139,7 +139,6 @@ impl Physics {
         let mass = sph.density / sum;
         let fall = (2.0 * sph.gravity.length() * f64::from(setup.fall)).sqrt().max(0.1);
         let sound = sph.sound_speed.unwrap_or(10.0 * fall);
-        let speed = if sph.solver == Solver::Wcsph { sound } else { fall };
         let support = f64::from(kernel.support);
         // Fowler's γ = (π/8) n² ∫ f(r) r⁴ dr for pair forces f(r) = m κ r W(r), integrated.
         let cohesion = sph.surface_tension * 6336.0 * mass
@@ -151,7 +150,7 @@ impl Physics {
             spacing: setup.spacing,
             gravity: sph.gravity.to_array().map(|g| g as f32),
             // Monaghan's α c h/10, h being half the support.
-            viscosity: (sph.viscosity + sph.smoothing * speed * support / 20.0) as f32,
+            viscosity: (sph.viscosity + sph.smoothing * sound * support / 20.0) as f32,
             cohesion: cohesion as f32,
             sound: sound as f32,
             sph: sph.clone(),
@@ -221,7 +220,7 @@ impl Simulation {
         let longest = 1.0 / (self.physics.sph.fps * f64::from(self.physics.sph.substeps));
         while self.stats.time < end {
             let left = end - self.stats.time;
-            let allowed = self.longest_step().min(longest);
+            let allowed = self.next_step().min(longest);
             if allowed < SHORTEST_STEP {
                 return Err(self.blown_up());
             }
@@ -270,16 +269,20 @@ impl Simulation {
         let mut speed = f64::from(self.greatest.speed).sqrt();
         let weight = gravity.iter().map(|g| f64::from(g * g)).sum::<f64>().sqrt();
         // Until the first step, particles are only about to fall.
-        let mut acceleration = weight;
+        let acceleration = weight.max(f64::from(self.greatest.acceleration).sqrt());
         if sph.solver == Solver::Wcsph {
             speed += f64::from(*sound);
-            acceleration = acceleration.max(f64::from(self.greatest.acceleration).sqrt());
         }
-        let allowed = (sph.cfl * spacing / speed)
-            .min(sph.cfl * (spacing / acceleration).sqrt())
+        (sph.cfl * spacing / speed)
+            .min(0.25 * sph.cfl * (spacing / acceleration).sqrt())
             .min(spacing * spacing / (4.0 * f64::from(*viscosity)))
-            .min(LONGEST_STEP);
-        match (sph.solver, self.stats.step_secs) {
+            .min(LONGEST_STEP)
+    }
+
+    /// [`Simulation::longest_step`], but not much longer than the last.
+    fn next_step(&self) -> f64 {
+        let allowed = self.longest_step();
+        match (self.physics.sph.solver, self.stats.step_secs) {
             (Solver::Wcsph, _) => allowed,
             (Solver::Dfsph, 0.0) => allowed * FIRST_STEP,
             (Solver::Dfsph, last) => allowed.min(last * GROWTH),
@@ -315,43 +318,40 @@ impl Simulation {
         (around, &mut self.fluid, &self.physics, &mut self.stats)
     }
 
-    /// Moves each particle by its velocity after `change` has altered that; keeps all in the tank.
+    /// Moves each particle, and keeps all in the tank.
     pub(crate) fn move_on(fluid: &mut Fluid, physics: &Physics, secs: f32) -> Greatest {
         let n = fluid.count;
-        let ([x, y, z], [u, v, w]) = (&mut fluid.position, &mut fluid.velocity);
-        (
-            x[..n].par_chunks_mut(CHUNK),
-            y[..n].par_chunks_mut(CHUNK),
-            z[..n].par_chunks_mut(CHUNK),
-            u[..n].par_chunks_mut(CHUNK),
-            v[..n].par_chunks_mut(CHUNK),
-            w[..n].par_chunks_mut(CHUNK),
-        )
-            .into_par_iter()
-            .map(|(x, y, z, u, v, w)| {
-                let mut greatest = Greatest::default();
-                for (axis, (row, speeds)) in [(x, &mut *u), (y, &mut *v), (z, &mut *w)].into_iter().enumerate() {
-                    // Where the samples of the walls are.
-                    let behind = 0.5 * physics.spacing;
-                    let (low, high) =
-                        (physics.tank[0][axis] - behind, physics.tank[1][axis] + behind);
-                    for (x, v) in row.iter_mut().zip(speeds.iter_mut()) {
-                        let next = *x + secs * *v;
-                        *x = next.clamp(low, high);
-                        if *x != next {
-                            greatest.put_back += 1;
-                            greatest.lost |= !next.is_finite();
-                            *v = 0.0;
-                        }
+        let mut greatest = Greatest::default();
+        for axis in 0..3 {
+            // Where the samples of the walls are.
+            let behind = 0.5 * physics.spacing;
+            let [low, high] = physics.tank.map(|corner| corner[axis]);
+            let (low, high) = (low - behind, high + behind);
+            let place = fluid.position[axis][..n].par_chunks_mut(CHUNK);
+            let speed = fluid.velocity[axis][..n].par_chunks_mut(CHUNK);
+            let motion = &fluid.motion[axis];
+            let moved = place.zip(speed).enumerate().map(|(chunk, (place, speed))| {
+                let mut found = Greatest::default();
+                for (i, (x, v)) in place.iter_mut().zip(speed).enumerate() {
+                    let next = *x + secs * motion.get(chunk * CHUNK + i).copied().unwrap_or(*v);
+                    *x = next.clamp(low, high);
+                    if *x != next {
+                        found.put_back += 1;
+                        found.lost |= !next.is_finite();
+                        *v = 0.0;
                     }
                 }
-                for i in 0..u.len() {
-                    greatest.speed =
-                        greatest.speed.max(u[i] * u[i] + v[i] * v[i] + w[i] * w[i]);
-                }
-                greatest
-            })
-            .reduce(Greatest::default, Greatest::with)
+                found
+            });
+            greatest = greatest.with(moved.reduce(Greatest::default, Greatest::with));
+        }
+        let [u, v, w] = fluid.velocity.each_ref().map(|row| row[..n].par_chunks(CHUNK));
+        let square = |((u, v), w): ((&[f32], &[f32]), &[f32])| {
+            let squares = u.iter().zip(v).zip(w).map(|((u, v), w)| u * u + v * v + w * w);
+            squares.fold(0.0, f32::max)
+        };
+        greatest.speed = u.zip(v).zip(w).map(square).reduce(|| 0.0, f32::max);
+        greatest
     }
 
     /// The frame as it stands.
@@ -360,7 +360,8 @@ impl Simulation {
         let (around, fluid, physics, stats) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
-        around.of(fluid, physics).sum(DensityAndMask, [], sums.each_mut().map(|row| &mut row[..n]));
+        let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
+        around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
         let mut frame = Frame {
             time: stats.time,
             step: stats.steps,
@@ -377,7 +378,7 @@ impl Simulation {
             frame.density[id] = scale * (1.0 + sums[0][at]);
             let pressure = match physics.sph.solver {
                 Solver::Wcsph => physics.pressure(frame.density[id]),
-                Solver::Dfsph => fluid.warm[0][at] + fluid.warm[1][at],
+                Solver::Dfsph => fluid.warm[0][at],
             };
             frame.pressure[id] = pressure;
             let side = |first: usize| [sums[first][at], sums[first + 1][at], sums[first + 2][at]];
