@@ -21,7 +21,7 @@ const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// No scene is longer, and a picture's scene stands before its pixels.
 const SCENE_BYTES: u64 = 32 << 20;
 
-/// Opens a source: a path, a quoted pattern, `demo:…`, `sim:…` ([`crate::simulate`]), or [`BUILT_IN`].
+/// Opens a source: a path, a quoted pattern, `demo:…`, `sim:…` ([`crate::Simulated`]), or [`BUILT_IN`].
 ///
 /// # Errors
 /// As [`Series::open`]; an unknown scenario or parameter of it.

@@ -8,8 +8,8 @@
 //! P₊ₓ = min(½ Σ over j on the +x side of (x²/r²) (1 − r/h), 1)
 //!
 //! with x the component and r the length of the way to j: x²/r² is how straight ahead j lies (and adds to
-//! 1 over the three axes), 1 − r/h how near. For particles at rest, a spacing of h/2 apart, a filled side
-//! gives a little more than 1 and a surface about the half.
+//! 1 over the three axes), 1 − r/h how near. For particles at rest on a lattice, h/2 apart, a filled side
+//! gives 0.63; compressed liquid up to 1.
 //!
 //! The pass adds up S = Σ (x²/r²) w and D = Σ (x|x|/r²) w, both sides at once; then P₊ = (S + D)/4 and
 //! P₋ = (S − D)/4.

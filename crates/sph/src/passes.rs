@@ -157,7 +157,7 @@ impl Pair<4, 3> for Force {
         i: [f32x16<S>; 4],
         weight: f32x16<S>,
     ) -> [f32x16<S>; 3] {
-        let push = cube(at.w) * weight * (i[0] + i[0]);
+        let push = cube(at.w) * weight * i[0];
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
 }
@@ -193,7 +193,8 @@ impl Pair<3, 1> for Divergence {
     }
 }
 
-/// Σ t (s_i + s_j) d: what pressures s do to velocities, over m C.
+/// Σ t (s_i + s_j) d: what pressures s do to velocities, over m C. A wall answers with the particle's own
+/// pressure.
 #[derive(Clone, Copy)]
 pub(crate) struct Push;
 

@@ -162,7 +162,7 @@ fn forces_are_sums_over_all_pairs() {
                 t * ((i[0] + j[0]) * d[a] - drag) - f64::from(0.3f32) * shape(w) * d[a]
             })
         },
-        |d, w, i, weight| d.map(|d| 2.0 * w.powi(3) * weight * i[0] * d),
+        |d, w, i, weight| d.map(|d| w.powi(3) * weight * i[0] * d),
     );
     assert_near(&case.fast(force, Level::new()), &slow, TOLERANCE);
 }
