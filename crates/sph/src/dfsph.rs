@@ -36,7 +36,7 @@ const WARM: f32 = 0.9;
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
 /// The part of the tolerance at which places are right, as densities are not quite linear in them.
-const PLACE: f64 = 0.4;
+const PLACE: f64 = 0.5;
 /// Iterations at the least.
 const LEAST: u64 = 1;
 

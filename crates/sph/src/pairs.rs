@@ -314,23 +314,27 @@ fn one<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     let place = of_buffer(simd, &desk.positions, (vector, lane));
     let i = of_buffer(simd, &desk.inputs, (vector, lane));
     let mut sums = [zero; OUT];
-    let last = total.div_ceil(LANES);
+    // All of one length, so that no index needs a test.
+    let rest = vector..total.div_ceil(LANES);
+    let [x, y, z] = desk.positions.each_ref().map(|row| &row[rest.clone()]);
+    let inputs = desk.inputs.each_ref().map(|row| &row[rest.clone()]);
+    let mut outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
     // The particle itself and those before it have been met.
     let met = mask32x16::from_bitmask(simd, (2u64 << lane) - 1);
-    for v in vector..last {
-        let mut at = apart(simd, place, &desk.positions, v);
-        if v == vector {
+    for v in 0..rest.len() {
+        let mut at = apart(simd, place, [x, y, z], v);
+        if v == 0 {
             at.square = met.select(f32x16::splat(simd, FAR_SQUARE), at.square);
         }
         at.w = weight(at.square, support);
         let mut j = [zero; IN];
         for n in 0..IN {
-            j[n] = f32x16::from_slice(simd, &desk.inputs[n][v].0);
+            j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
         }
         let found = pair.pair(at, i, j);
         for o in 0..OUT {
             sums[o] = sums[o] + found[o];
-            let to = &mut desk.sums[o][v].0;
+            let to = &mut outputs[o][v].0;
             let before = f32x16::from_slice(simd, to);
             let after = if P::SIGN[o] < 0.0 { before - found[o] } else { before + found[o] };
             after.store_slice(to);
@@ -352,8 +356,9 @@ fn one_wall<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     let place = of_buffer(simd, &desk.positions, (vector, lane));
     let i = of_buffer(simd, &desk.inputs, (vector, lane));
     let mut sums = [f32x16::splat(simd, 0.0); OUT];
-    let [x, y, z, weights] = &desk.walls;
-    for v in 0..total.div_ceil(LANES) {
+    let vectors = total.div_ceil(LANES);
+    let [x, y, z, weights] = desk.walls.each_ref().map(|row| &row[..vectors]);
+    for v in 0..vectors {
         let mut at = apart(simd, place, [x, y, z], v);
         at.w = self::weight(at.square, support);
         let found = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
@@ -378,31 +383,13 @@ fn of_buffer<S: Simd, const N: usize>(
     numbers
 }
 
-trait Rows {
-    fn row(&self, axis: usize) -> &[Sixteen];
-}
-
-impl Rows for &[Vec<Sixteen>; 3] {
-    #[inline(always)]
-    fn row(&self, axis: usize) -> &[Sixteen] {
-        &self[axis]
-    }
-}
-
-impl Rows for [&Vec<Sixteen>; 3] {
-    #[inline(always)]
-    fn row(&self, axis: usize) -> &[Sixteen] {
-        self[axis]
-    }
-}
-
 /// Sixteen neighbours as seen from `place`; w is still to be told.
 #[inline(always)]
-fn apart<S: Simd>(simd: S, place: [f32x16<S>; 3], rows: impl Rows, v: usize) -> Apart<S> {
+fn apart<S: Simd>(simd: S, place: [f32x16<S>; 3], rows: [&[Sixteen]; 3], v: usize) -> Apart<S> {
     let zero = f32x16::splat(simd, 0.0);
     let mut d = [zero; 3];
     for axis in 0..3 {
-        d[axis] = place[axis] - f32x16::from_slice(simd, &rows.row(axis)[v].0);
+        d[axis] = place[axis] - f32x16::from_slice(simd, &rows[axis][v].0);
     }
     let square = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
     Apart { d, square, w: zero }
