@@ -98,7 +98,9 @@ impl Simulated {
         let error = |message: String| ReadError::new(&self.source, Place::Frame(frame), message);
         if frame >= self.frames {
             let last = self.frames - 1;
-            return Err(error(format!("the frames are 0 to {last}; there are more with seconds=…")));
+            return Err(error(format!(
+                "the frames are 0 to {last}; there are more with seconds=…"
+            )));
         }
         if let Some(kept) = self.kept.get(frame) {
             return Ok(kept.clone());
@@ -166,7 +168,8 @@ fn particles(simulation: &mut Simulation) -> Particles {
     let radius = Radius::Uniform(0.5 * simulation.spacing());
     let Frame { time, step, positions, velocities, density, pressure, masks } = simulation.frame();
     let ids = (1..=positions.len() as i64).collect();
-    let column = |name: &str, components, values| Column::new(name, components, Values::F32(values));
+    let column =
+        |name: &str, components, values| Column::new(name, components, Values::F32(values));
     Particles {
         columns: vec![
             column(names::VELOCITY, 3, velocities.into_flattened()),
@@ -241,7 +244,12 @@ mod tests {
         let third = frame(&mut one, 3);
         let first = frame(&mut one, 1);
         let mut steps = 0;
-        let again = one.frame(3, &mut |_| { steps += 1; true }).unwrap();
+        let again = one
+            .frame(3, &mut |_| {
+                steps += 1;
+                true
+            })
+            .unwrap();
         assert!(again == third && steps == 0);
         let mut two = simulated("dam-break?particles=300&seconds=0.2").unwrap();
         assert!(frame(&mut two, 1) == first && frame(&mut two, 3) == third);

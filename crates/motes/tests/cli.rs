@@ -536,7 +536,8 @@ fn a_simulation_is_a_source_and_is_written() {
         let info = succeeds(&folder, &["info", &file, "--json"]);
         let info: Value = serde_json::from_str(&info).unwrap();
         assert_eq!(info["particles"], 300, "{end}");
-        let names: Vec<_> = info["properties"].as_array().unwrap().iter().map(|p| &p["name"]).collect();
+        let names: Vec<_> =
+            info["properties"].as_array().unwrap().iter().map(|p| &p["name"]).collect();
         assert!(names.iter().any(|n| *n == "Particle Mask"), "{end}: {names:?}");
         // The file and the simulation itself make the same picture.
         let by = ["--color-by", "Density", "--set", "overlay.time=off", "--set", "overlay.box=off"];
@@ -558,6 +559,11 @@ fn a_simulation_is_a_source_and_is_written() {
     assert!(fails(&folder, &["info", "sim:column?widht=1"], 2).contains("width"));
     let late = ["simulate", short, "--frame", "9", "-o", "o.vtk"];
     assert!(fails(&folder, &late, 1).contains("0 to 3"));
-    assert!(fs::read_dir(&folder).unwrap().flatten().all(|f| f.file_name().to_string_lossy().starts_with('o')
-        || f.file_name() == "stats.json"));
+    assert!(
+        fs::read_dir(&folder).unwrap().flatten().all(|f| f
+            .file_name()
+            .to_string_lossy()
+            .starts_with('o')
+            || f.file_name() == "stats.json")
+    );
 }

@@ -259,8 +259,6 @@ settings! {
         viscosity: f64 = 1e-6,
         /// Numerical viscosity, as Monaghan's α with sound_speed (dfsph too): smooths what the particles cannot resolve.
         smoothing: f64 = 0.05,
-        /// Surface tension, N/m; water has 0.072.
-        surface_tension: f64 = 0.0,
         /// Gravity, m/s².
         gravity: DVec3 = DVec3::new(0.0, 0.0, -9.81),
         /// Speed of sound of wcsph, m/s; none: ten times that of a free fall through the liquid.

@@ -111,9 +111,7 @@ impl Order {
         let mut first = 0;
         let mut from = &mut self.from[..];
         let mut planes = Vec::with_capacity(lattice.planes);
-        for (plane, cells) in
-            self.starts[..lattice.cells()].chunks_mut(lattice.plane).enumerate()
-        {
+        for (plane, cells) in self.starts[..lattice.cells()].chunks_mut(lattice.plane).enumerate() {
             let count: u32 = chunk_starts.iter().map(|s| s[plane + 1] - s[plane]).sum();
             let (own, rest) = from.split_at_mut(count as usize);
             from = rest;
@@ -164,8 +162,7 @@ mod tests {
         order.sort(&lattice, [&x, &y, &z], 20_000);
         let mut seen = 0;
         for cell in 0..lattice.cells() {
-            let members =
-                &order.from[order.starts[cell] as usize..order.starts[cell + 1] as usize];
+            let members = &order.from[order.starts[cell] as usize..order.starts[cell + 1] as usize];
             assert!(members.windows(2).all(|pair| pair[0] < pair[1]));
             for i in members.iter().map(|i| *i as usize) {
                 assert_eq!(lattice.cell([x[i], y[i], z[i]]), cell);

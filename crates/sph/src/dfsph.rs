@@ -32,7 +32,6 @@ const RELAXATION: f32 = 0.5;
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
 
-
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
 /// The part of the tolerance at which places are right, as densities are not quite linear in them.
@@ -60,7 +59,8 @@ impl Simulation {
         for (row, velocity) in fluid.motion.iter_mut().zip(&fluid.velocity) {
             row.clone_from(velocity);
         }
-        let second = solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
+        let second =
+            solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
         stats.iterations = [stats.iterations[0] + first.0, stats.iterations[1] + second.0];
         stats.compression = second.1;
         Greatest { acceleration, ..Self::move_on(fluid, physics, secs) }
@@ -86,7 +86,8 @@ fn factors(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let slope = physics.mass * physics.kernel.slope;
     // Where there is hardly a neighbour, as much is due to it as to one two thirds of the support away.
     let least = (2.0 / 3.0 * physics.kernel.support / 27.0).powi(2);
-    let rows = fluid.density[..n].par_chunks_mut(CHUNK).zip(fluid.factor[..n].par_chunks_mut(CHUNK));
+    let rows =
+        fluid.density[..n].par_chunks_mut(CHUNK).zip(fluid.factor[..n].par_chunks_mut(CHUNK));
     rows.enumerate().for_each(|(chunk, (density, factor))| {
         let part = chunk * CHUNK..chunk * CHUNK + density.len();
         let [a, all @ .., e] = sums.each_ref().map(|row| &row[part.clone()]);
@@ -100,7 +101,7 @@ fn factors(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     fluid.sums = sums;
 }
 
-/// Viscosity, cohesion and gravity. The square of the greatest acceleration.
+/// Viscosity and gravity. The square of the greatest acceleration.
 fn forces(around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -> f32 {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
@@ -156,13 +157,7 @@ fn solve(
 
 /// Finds what is still to be pushed, and the mean error of the densities without it: too dense, or too
 /// thin where there is pressure. (A start with too much pressure would else not be seen, and add energy.)
-fn correct(
-    aim: Aim,
-    around: Around<'_>,
-    fluid: &mut Fluid,
-    physics: &Physics,
-    secs: f32,
-) -> f64 {
+fn correct(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -> f64 {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let sum = &mut sums[0];

@@ -90,9 +90,8 @@ fn gather<T: Copy + Send + Sync>(from: &[u32], row: &[T], to: &mut [T]) {
 
 /// The sum of `value` over `0..count`, in the same order for any number of threads.
 pub(crate) fn total(count: usize, value: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let part = |chunk: usize| {
-        (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(&value).sum::<f64>()
-    };
+    let part =
+        |chunk: usize| (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(&value).sum::<f64>();
     let parts: Vec<f64> = (0..count.div_ceil(CHUNK)).into_par_iter().map(part).collect();
     parts.iter().sum()
 }

@@ -17,6 +17,8 @@
 //! - The same setup and settings give the same bits for any number of threads.
 //! - SI units throughout.
 
+#![allow(clippy::needless_range_loop)] // closures and iterators leave the instruction set of a kernel
+
 mod cells;
 mod dfsph;
 mod fluid;

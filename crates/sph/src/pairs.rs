@@ -55,12 +55,8 @@ pub(crate) trait Pair<const IN: usize, const OUT: usize>: Copy + Send + Sync {
     ) -> [f32x16<S>; OUT];
 
     /// What particle i gets from a sample of the wall of weight ψ/m.
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; IN],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; OUT];
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], weight: f32x16<S>)
+    -> [f32x16<S>; OUT];
 }
 
 /// Particles in cell order, and how to go about them.
@@ -96,6 +92,9 @@ struct Desk<const IN: usize, const OUT: usize> {
     positions: [Vec<Sixteen>; 3],
     inputs: [Vec<Sixteen>; IN],
     sums: [Vec<Sixteen>; OUT],
+    /// The sums of the cell's own particles: not among those of the buffer, as a vector cannot be read
+    /// soon after one of its numbers was written.
+    own: [Vec<f32>; OUT],
     walls: [Vec<Sixteen>; 4],
 }
 
@@ -106,6 +105,7 @@ impl<const IN: usize, const OUT: usize> Desk<IN, OUT> {
             positions: std::array::from_fn(row),
             inputs: std::array::from_fn(row),
             sums: std::array::from_fn(row),
+            own: std::array::from_fn(|_| vec![]),
             walls: std::array::from_fn(row),
         }
     }
@@ -138,12 +138,9 @@ impl Neighbors<'_> {
         sums.iter_mut().for_each(|row| row.par_chunks_mut(1 << 14).for_each(|part| part.fill(0.0)));
         for odd in 0..2 {
             let tasks = self.tasks(odd, &mut sums);
-            tasks.into_par_iter().with_max_len(1).for_each_init(
-                Desk::new,
-                |desk, mut task| {
-                    dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, desk));
-                },
-            );
+            tasks.into_par_iter().with_max_len(1).for_each_init(Desk::new, |desk, mut task| {
+                dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, desk));
+            });
         }
     }
 
@@ -200,17 +197,13 @@ fn plane<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
         let near_wall = all.walls.near(cell);
         let wall_count = if near_wall { load_walls(simd, all, cell, desk) } else { 0 };
         let own = end - first;
-        for k in 0..own {
-            let mut sums = one(simd, all.support, pair, (k, total), desk);
-            if wall_count > 0 {
-                let walls = one_wall(simd, all.support, pair, (k, wall_count), desk);
-                for o in 0..OUT {
-                    sums[o] = sums[o] + walls[o];
-                }
-            }
-            for o in 0..OUT {
-                desk.sums[o][k / LANES].0[k % LANES] += sums[o].reduce_sum();
-            }
+        desk.own.iter_mut().for_each(|row| row.resize(own, 0.0));
+        // Two at a time read and write the buffer once.
+        for k in (0..own - own % 2).step_by(2) {
+            some::<_, _, 2, _, _>(simd, all.support, pair, (k, total, wall_count), desk);
+        }
+        if own % 2 == 1 {
+            some::<_, _, 1, _, _>(simd, all.support, pair, (own - 1, total, wall_count), desk);
         }
         store(simd, (&runs, task.first), desk, &mut task.sums);
     }
@@ -300,47 +293,68 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
     total
 }
 
-/// The sums of particle `k` of the cell; its partners' go to the buffer.
+/// The sums of the `M` particles of the cell from `k` on, a divisor of [`LANES`]; their partners' go to
+/// the buffer.
 #[inline(always)]
-fn one<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: usize>(
     simd: S,
     support: f32,
     pair: P,
-    (k, total): (usize, usize),
+    (k, total, wall_count): (usize, usize, usize),
     desk: &mut Desk<IN, OUT>,
-) -> [f32x16<S>; OUT] {
+) {
     let zero = f32x16::splat(simd, 0.0);
     let (vector, lane) = (k / LANES, k % LANES);
-    let place = of_buffer(simd, &desk.positions, (vector, lane));
-    let i = of_buffer(simd, &desk.inputs, (vector, lane));
-    let mut sums = [zero; OUT];
+    let (mut place, mut i) = ([[zero; 3]; M], [[zero; IN]; M]);
+    // Each particle itself and those before it have been met.
+    let mut met = [mask32x16::from_bitmask(simd, 0); M];
+    for m in 0..M {
+        place[m] = of_buffer(simd, &desk.positions, (vector, lane + m));
+        i[m] = of_buffer(simd, &desk.inputs, (vector, lane + m));
+        met[m] = mask32x16::from_bitmask(simd, (2u64 << (lane + m)) - 1);
+    }
+    let mut sums = [[zero; OUT]; M];
     // All of one length, so that no index needs a test.
     let rest = vector..total.div_ceil(LANES);
     let [x, y, z] = desk.positions.each_ref().map(|row| &row[rest.clone()]);
     let inputs = desk.inputs.each_ref().map(|row| &row[rest.clone()]);
-    let mut outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
-    // The particle itself and those before it have been met.
-    let met = mask32x16::from_bitmask(simd, (2u64 << lane) - 1);
+    let outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
     for v in 0..rest.len() {
-        let mut at = apart(simd, place, [x, y, z], v);
-        if v == 0 {
-            at.square = met.select(f32x16::splat(simd, FAR_SQUARE), at.square);
-        }
-        at.w = weight(at.square, support);
         let mut j = [zero; IN];
         for n in 0..IN {
             j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
         }
-        let found = pair.pair(at, i, j);
+        let mut theirs = [zero; OUT];
+        for m in 0..M {
+            let mut at = apart(simd, place[m], [x, y, z], v);
+            if v == 0 {
+                at.square = met[m].select(f32x16::splat(simd, FAR_SQUARE), at.square);
+            }
+            at.w = weight(at.square, support);
+            let found = pair.pair(at, i[m], j);
+            for o in 0..OUT {
+                sums[m][o] += found[o];
+                theirs[o] += found[o];
+            }
+        }
         for o in 0..OUT {
-            sums[o] = sums[o] + found[o];
             let to = &mut outputs[o][v].0;
             let before = f32x16::from_slice(simd, to);
-            let after = if P::SIGN[o] < 0.0 { before - found[o] } else { before + found[o] };
+            let after = if P::SIGN[o] < 0.0 { before - theirs[o] } else { before + theirs[o] };
             after.store_slice(to);
         }
     }
-    sums
+    for m in 0..M {
+        if wall_count > 0 {
+            let walls = one_wall(simd, support, pair, (k + m, wall_count), desk);
+            for o in 0..OUT {
+                sums[m][o] += walls[o];
+            }
+        }
+        for o in 0..OUT {
+            desk.own[o][k + m] = sums[m][o].reduce_sum();
+        }
+    }
 }
 
 /// The sums of particle `k` of the cell over samples of walls.
@@ -363,7 +377,7 @@ fn one_wall<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
         at.w = self::weight(at.square, support);
         let found = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
         for o in 0..OUT {
-            sums[o] = sums[o] + found[o];
+            sums[o] += found[o];
         }
     }
     sums
@@ -412,6 +426,10 @@ fn store<S: Simd, const IN: usize, const OUT: usize>(
 ) {
     for o in 0..OUT {
         let from: &[f32] = bytemuck::cast_slice(&desk.sums[o]);
+        let own = runs[0].0 - first;
+        for (to, sum) in sums[o][own..].iter_mut().zip(&desk.own[o]) {
+            *to += sum;
+        }
         let mut at = 0;
         for (begin, end) in runs {
             let to = &mut sums[o][begin - first..end - first];

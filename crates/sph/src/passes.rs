@@ -27,22 +27,12 @@ impl Pair<0, 1> for Density {
     const SIGN: [f32; 1] = [1.0];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        _: [f32x16<S>; 0],
-    ) -> [f32x16<S>; 1] {
+    fn pair<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], _: [f32x16<S>; 0]) -> [f32x16<S>; 1] {
         [shape(at.w)]
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 1] {
+    fn wall<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], weight: f32x16<S>) -> [f32x16<S>; 1] {
         [shape(at.w) * weight]
     }
 }
@@ -56,12 +46,7 @@ impl Pair<0, 7> for DensityAndMask {
     const SIGN: [f32; 7] = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        _: [f32x16<S>; 0],
-    ) -> [f32x16<S>; 7] {
+    fn pair<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], _: [f32x16<S>; 0]) -> [f32x16<S>; 7] {
         let share = at.w / at.square.max(f32x16::splat(at.w.token(), 1e-30));
         let [x, y, z] = [at.d[0] * share, at.d[1] * share, at.d[2] * share];
         let [p, q, r] = at.d;
@@ -69,12 +54,7 @@ impl Pair<0, 7> for DensityAndMask {
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 7] {
+    fn wall<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], weight: f32x16<S>) -> [f32x16<S>; 7] {
         let zero = f32x16::splat(at.w.token(), 0.0);
         [shape(at.w) * weight, zero, zero, zero, zero, zero, zero]
     }
@@ -89,12 +69,7 @@ impl Pair<0, 8> for Factors {
     const SIGN: [f32; 8] = [1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        _: [f32x16<S>; 0],
-    ) -> [f32x16<S>; 8] {
+    fn pair<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], _: [f32x16<S>; 0]) -> [f32x16<S>; 8] {
         let t = cube(at.w);
         let zero = f32x16::splat(at.w.token(), 0.0);
         let [x, y, z] = [t * at.d[0], t * at.d[1], t * at.d[2]];
@@ -102,12 +77,7 @@ impl Pair<0, 8> for Factors {
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        _: [f32x16<S>; 0],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 8] {
+    fn wall<S: Simd>(self, at: Apart<S>, _: [f32x16<S>; 0], weight: f32x16<S>) -> [f32x16<S>; 8] {
         let t = cube(at.w) * weight;
         let zero = f32x16::splat(at.w.token(), 0.0);
         let [x, y, z] = [t * at.d[0], t * at.d[1], t * at.d[2]];
@@ -115,32 +85,23 @@ impl Pair<0, 8> for Factors {
     }
 }
 
-/// The force of pressure, viscosity and cohesion on a particle, over m C:
-/// Σ t [(P_i + P_j) d − ν (v_i − v_j)] − κ Σ W/A d.
+/// The force of pressure and viscosity on a particle, over m C: Σ t [(P_i + P_j) d − ν (v_i − v_j)].
 ///
 /// Numbers: P = p/ρ², and the velocity. Viscosity is the Laplacian of Brookshaw 1985, for this kernel
-/// without a division: 2ν m/ρ Σ (v_i − v_j) (d·∇W)/r² = −2ν m/ρ C Σ t (v_i − v_j). Cohesion is that of
-/// Becker & Teschner 2007.
+/// without a division: 2ν m/ρ Σ (v_i − v_j) (d·∇W)/r² = −2ν m/ρ C Σ t (v_i − v_j).
 #[derive(Clone, Copy)]
 pub(crate) struct Force {
     /// 2ν/ρ.
     pub viscosity: f32,
-    /// κ A / (m C).
-    pub cohesion: f32,
 }
 
 impl Pair<4, 3> for Force {
     const SIGN: [f32; 3] = [-1.0; 3];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 4],
-        j: [f32x16<S>; 4],
-    ) -> [f32x16<S>; 3] {
+    fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], j: [f32x16<S>; 4]) -> [f32x16<S>; 3] {
         let t = cube(at.w);
-        let push = t * ((i[0] + j[0]) - at.w * (at.w * -4.0 + 5.0) * self.cohesion);
+        let push = t * (i[0] + j[0]);
         let drag = t * -self.viscosity;
         let [u, v, w] = [i[1] - j[1], i[2] - j[2], i[3] - j[3]];
         [
@@ -151,12 +112,7 @@ impl Pair<4, 3> for Force {
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 4],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 3] {
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], weight: f32x16<S>) -> [f32x16<S>; 3] {
         let push = cube(at.w) * weight * i[0];
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
@@ -170,24 +126,14 @@ impl Pair<3, 1> for Divergence {
     const SIGN: [f32; 1] = [1.0];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 3],
-        j: [f32x16<S>; 3],
-    ) -> [f32x16<S>; 1] {
+    fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 3], j: [f32x16<S>; 3]) -> [f32x16<S>; 1] {
         let along = (i[0] - j[0]) * at.d[0];
         let along = (i[1] - j[1]).mul_add(at.d[1], along);
         [cube(at.w) * (i[2] - j[2]).mul_add(at.d[2], along)]
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 3],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 1] {
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 3], weight: f32x16<S>) -> [f32x16<S>; 1] {
         let along = i[2].mul_add(at.d[2], i[1].mul_add(at.d[1], i[0] * at.d[0]));
         [cube(at.w) * weight * along]
     }
@@ -202,23 +148,13 @@ impl Pair<1, 3> for Push {
     const SIGN: [f32; 3] = [-1.0; 3];
 
     #[inline(always)]
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 1],
-        j: [f32x16<S>; 1],
-    ) -> [f32x16<S>; 3] {
+    fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], j: [f32x16<S>; 1]) -> [f32x16<S>; 3] {
         let push = cube(at.w) * (i[0] + j[0]);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
 
     #[inline(always)]
-    fn wall<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; 1],
-        weight: f32x16<S>,
-    ) -> [f32x16<S>; 3] {
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], weight: f32x16<S>) -> [f32x16<S>; 3] {
         let push = cube(at.w) * weight * (i[0] + i[0]);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }

@@ -11,8 +11,7 @@ pub(crate) fn uniform(seed: u64, n: u64) -> f32 {
 /// Points in the box from 0 to `size`, coordinate by coordinate, with room for whole vectors behind.
 pub(crate) fn points(count: usize, size: [f32; 3]) -> [Vec<f32>; 3] {
     std::array::from_fn(|a| {
-        let mut row: Vec<f32> =
-            (0..count).map(|i| uniform(a as u64, i as u64) * size[a]).collect();
+        let mut row: Vec<f32> = (0..count).map(|i| uniform(a as u64, i as u64) * size[a]).collect();
         row.resize(crate::pairs::padded(count), 0.0);
         row
     })

@@ -153,13 +153,13 @@ fn passes_are_sums_over_all_pairs() {
 #[test]
 fn forces_are_sums_over_all_pairs() {
     let case = Case::new(1200);
-    let force = Force { viscosity: 0.02, cohesion: 0.3 };
+    let force = Force { viscosity: 0.02 };
     let slow = case.slow(
         |d, w, i, j| {
             let t = w.powi(3);
             [0, 1, 2].map(|a| {
                 let drag = f64::from(0.02f32) * (i[a + 1] - j[a + 1]);
-                t * ((i[0] + j[0]) * d[a] - drag) - f64::from(0.3f32) * shape(w) * d[a]
+                t * ((i[0] + j[0]) * d[a] - drag)
             })
         },
         |d, w, i, weight| d.map(|d| w.powi(3) * weight * i[0] * d),
@@ -204,7 +204,7 @@ fn masks_are_sums_over_all_pairs() {
 #[test]
 fn instruction_sets_and_numbers_of_threads_agree() {
     let case = Case::new(1500);
-    let force = Force { viscosity: 0.02, cohesion: 0.3 };
+    let force = Force { viscosity: 0.02 };
     let fast = case.fast(force, Level::new());
     let plain = case.fast(force, Level::baseline());
     let wide: Vec<[f64; 3]> = plain.iter().map(|s| s.map(f64::from)).collect();

@@ -185,7 +185,9 @@ impl Scenario {
             let whole = *name == "particles" || *name == "jets";
             if whole && (number.fract() != 0.0 || !(1.0..=MOST).contains(&number)) {
                 let most = MOST;
-                return Err(format!("{name}: expected a whole number, 1 to {most:e}, found '{text}'"));
+                return Err(format!(
+                    "{name}: expected a whole number, 1 to {most:e}, found '{text}'"
+                ));
             }
             values[at] = number;
         }
@@ -390,7 +392,12 @@ mod tests {
             for count in ["1", "1000", "27000"] {
                 let setup = scenario.setup(&[("particles", count)]).unwrap();
                 let jets = if setup.jets.is_empty() { 0 } else { setup.most };
-                assert_eq!(setup.positions.len() + jets, count.parse().unwrap(), "{}", scenario.name);
+                assert_eq!(
+                    setup.positions.len() + jets,
+                    count.parse().unwrap(),
+                    "{}",
+                    scenario.name
+                );
                 assert_eq!(setup.velocities.len(), setup.positions.len());
                 let [low, high] = setup.tank;
                 let places = setup.positions.iter().chain(setup.jets.iter().flat_map(|j| &j.layer));

@@ -77,8 +77,6 @@ pub(crate) struct Physics {
     pub gravity: [f32; 3],
     /// ν in all, m²/s.
     pub viscosity: f32,
-    /// κ of cohesion.
-    pub cohesion: f32,
     /// c of wcsph.
     pub sound: f32,
     pub sph: Sph,
@@ -140,9 +138,6 @@ impl Physics {
         let fall = (2.0 * sph.gravity.length() * f64::from(setup.fall)).sqrt().max(0.1);
         let sound = sph.sound_speed.unwrap_or(10.0 * fall);
         let support = f64::from(kernel.support);
-        // Fowler's γ = (π/8) n² ∫ f(r) r⁴ dr for pair forces f(r) = m κ r W(r), integrated.
-        let cohesion = sph.surface_tension * 6336.0 * mass
-            / (21.0 * sph.density.powi(2) * support.powi(3));
         Self {
             kernel,
             mass: mass as f32,
@@ -151,7 +146,6 @@ impl Physics {
             gravity: sph.gravity.to_array().map(|g| g as f32),
             // Monaghan's α c h/10, h being half the support.
             viscosity: (sph.viscosity + sph.smoothing * sound * support / 20.0) as f32,
-            cohesion: cohesion as f32,
             sound: sound as f32,
             sph: sph.clone(),
             tank: setup.tank,
@@ -166,11 +160,8 @@ impl Simulation {
         let physics = Physics::new(&setup, sph);
         let [low, high] = setup.tank;
         let margin = 0.5 * setup.spacing;
-        let lattice = Lattice::new(
-            low.map(|v| v - margin),
-            high.map(|v| v + margin),
-            physics.kernel.support,
-        );
+        let lattice =
+            Lattice::new(low.map(|v| v - margin), high.map(|v| v + margin), physics.kernel.support);
         let walls = Walls::new(&setup.solids, setup.spacing, &physics.kernel, &lattice);
         let mut fluid = Fluid::default();
         fluid.add(&setup.positions, &setup.velocities);
@@ -259,7 +250,9 @@ impl Simulation {
 
     fn blown_up(&self) -> String {
         let Stats { time, steps, .. } = self.stats;
-        format!("the simulation blew up after {time:.3} s and {steps} steps; a smaller cfl may help")
+        format!(
+            "the simulation blew up after {time:.3} s and {steps} steps; a smaller cfl may help"
+        )
     }
 
     /// The longest step allowed now, seconds.
@@ -402,9 +395,7 @@ impl Simulation {
         let inside = |p: &[f32; 3]| (0..3).all(|a| p[a] >= low[a] && p[a] <= high[a]);
         if let Some(at) = positions.iter().position(|p| !inside(p)) {
             let p = positions[at];
-            return Err(format!(
-                "particle {at} at {p:?} is outside the tank, {low:?} to {high:?}"
-            ));
+            return Err(format!("particle {at} at {p:?} is outside the tank, {low:?} to {high:?}"));
         }
         if positions.is_empty() || positions.len() > self.most {
             let (most, found) = (self.most, positions.len());

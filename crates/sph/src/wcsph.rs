@@ -23,10 +23,7 @@ impl Physics {
     /// The pass of forces, and the factor on its sums.
     pub(crate) fn force(&self) -> (Force, f32) {
         let scale = self.mass * self.kernel.slope;
-        let force = Force {
-            viscosity: 2.0 * self.viscosity / self.density,
-            cohesion: self.cohesion * self.kernel.value / scale,
-        };
+        let force = Force { viscosity: 2.0 * self.viscosity / self.density };
         (force, scale)
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use motes::{Scene, SimulationStats, Simulated, Watch};
+use motes::{Scene, Simulated, SimulationStats, Watch};
 use motes_frame::Unfinished;
 use motes_particles::Particles;
 use motes_particles::write::Format;
@@ -90,7 +90,11 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn write(&self, simulated: &mut Simulated, (first, last): (usize, usize)) -> Result<(), Failure> {
+    fn write(
+        &self,
+        simulated: &mut Simulated,
+        (first, last): (usize, usize),
+    ) -> Result<(), Failure> {
         // Two Ctrl-C end the program; the first one, after the step.
         let meter = Meter::new(Talk { quiet: true, ..self.talk });
         let bar = Bar::new(self.talk, (last - first + 1) as u64);

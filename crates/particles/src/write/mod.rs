@@ -22,12 +22,8 @@ pub enum Format {
 }
 
 /// The formats and the ends of their files' names.
-const ENDS: [(&str, Format); 4] = [
-    ("vtk", Format::Vtk),
-    ("npz", Format::Npz),
-    ("xyz", Format::Xyz),
-    ("extxyz", Format::Xyz),
-];
+const ENDS: [(&str, Format); 4] =
+    [("vtk", Format::Vtk), ("npz", Format::Npz), ("xyz", Format::Xyz), ("extxyz", Format::Xyz)];
 
 impl Format {
     /// The format of a file of this name.
@@ -124,7 +120,8 @@ mod tests {
             assert_eq!(after.radius, Radius::Each(vec![0.1; 5]), "{end}");
             assert_eq!(after.columns.len(), 5, "{end}");
             for column in &before.columns {
-                let found = after.columns.iter().find(|c| crate::read::names::same(&c.name, &column.name));
+                let found =
+                    after.columns.iter().find(|c| crate::read::names::same(&c.name, &column.name));
                 let found = found.unwrap_or_else(|| panic!("{end}: no {}", column.name));
                 assert_eq!(found.components, column.components, "{end}: {}", column.name);
                 for i in 0..column.values.len() {

@@ -45,7 +45,8 @@ fn array(
         Values::U8(v) => ("|u1", v.into()),
         Values::Names { codes, .. } => ("<u4", little(codes)),
     };
-    let shape = if components == 1 { format!("({rows},)") } else { format!("({rows}, {components})") };
+    let shape =
+        if components == 1 { format!("({rows},)") } else { format!("({rows}, {components})") };
     let dictionary =
         format!("{{'descr': '{descriptor}', 'fortran_order': False, 'shape': {shape}, }}");
     let length = (10 + dictionary.len() + 1).next_multiple_of(64) - 10;
