@@ -1,5 +1,5 @@
 //! The writers: one file per format, one frame per file. What is written, the readers read back: the
-//! same positions, radii and columns, bit for bit.
+//! same positions, radii and columns, in the precision they have.
 
 mod npz;
 mod vtk;
@@ -126,6 +126,9 @@ mod tests {
                 assert_eq!(found.components, column.components, "{end}: {}", column.name);
                 for i in 0..column.values.len() {
                     let (a, b) = (found.values.number(i), column.values.number(i));
+                    // Text is read in double precision: the same once it is f32 again.
+                    let single = matches!(column.values, Values::F32(_));
+                    let (a, b) = if single { (f64::from(a as f32), b) } else { (a, b) };
                     assert_eq!(a, b, "{end}: {} {i}", column.name);
                 }
             }
