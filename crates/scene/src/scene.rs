@@ -28,7 +28,7 @@ settings! {
         spheres: Spheres = Spheres::default(),
         /// The surface renderer.
         surface: Surface = Surface::default(),
-        /// The simulation of liquids, for sources sim:…
+        /// The simulation of liquids, for sim: sources.
         sph: Sph = Sph::default(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
