@@ -23,6 +23,7 @@ mod paint;
 mod picture;
 mod radius;
 mod session;
+mod simulate;
 mod stats;
 mod system;
 
@@ -31,7 +32,9 @@ pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
 pub use motes_film::{Film, FilmError, Settings as FilmSettings};
 pub use motes_frame::{Frame, Rgba8};
 pub use motes_scene::{Moment, Scene, SceneError};
-pub use open::{BUILT_IN, built_in_scene, is_picture, open, read_scene};
+pub use motes_sph::Stats as SimulationStats;
+pub use open::{BUILT_IN, built_in_scene, is_picture, open, open_with, read_scene};
 pub use picture::Picture;
 pub use session::{Layers, Quiet, Session, Shot, Watch};
+pub use simulate::{Simulated, scenarios};
 pub use stats::{Stats, peak_memory_bytes};

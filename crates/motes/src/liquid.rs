@@ -11,8 +11,8 @@ use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
-    Particles, Representation, Shadow, Smoothing, Spans, Surfaces, View, compress, connect, filter,
-    normals, shade_counted, splat, voxelize,
+    Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress, connect,
+    filter, normals, shade_finer, splat, voxelize,
 };
 
 use crate::Result;
@@ -103,7 +103,7 @@ impl Liquid<'_> {
         let view = self.view(bounds, finer);
         let surfaces = self.surfaces((&boundary, &params), view, stats);
         let color = self.shade(&surfaces, (&optics, &setting), stats);
-        let frame = Frame::new(size.0 as usize, size.1 as usize, halved(&color, size, finer))?;
+        let frame = Frame::new(size.0 as usize, size.1 as usize, color)?;
         if !layers {
             return Ok(frame);
         }
@@ -151,7 +151,7 @@ impl Liquid<'_> {
         Ok(Setting { environment, lights, shadow })
     }
 
-    /// The picture of surfaces.
+    /// The picture of surfaces, of which [`Self::finer`]² make a pixel.
     pub fn shade(
         &self,
         surfaces: &Surfaces,
@@ -171,7 +171,7 @@ impl Liquid<'_> {
             paint: self.painted().then_some(self as &dyn Paint),
             color: Vec3::from(self.scene.surface.color.linear()),
         };
-        let (color, work) = shade_counted(surfaces, optics, &around);
+        let (color, work) = shade_finer(surfaces, optics, &around, self.finer());
         let stage = match optics.mode {
             Mode::Front => "front",
             Mode::Translucent => "translucent",
@@ -223,6 +223,11 @@ impl Liquid<'_> {
                 Culling::Off => Cull::Off,
             },
             cell: s.cull_cell as f32,
+            spray: match s.spray {
+                surface::Spray::Keep if s.drop == s.ball => Spray::Liquid,
+                surface::Spray::Keep => Spray::Drops((s.drop / s.ball) as f32),
+                surface::Spray::Drop => Spray::Dropped,
+            },
             representation: match s.representation {
                 surface::Representation::Intervals => Representation::Intervals,
                 surface::Representation::Bits => Representation::Bits(Bits {
@@ -417,22 +422,6 @@ fn fitted(
     let far = farthest.max(1e-6 * bounds.diagonal());
     let near = nearest.max(1e-4 * far);
     View { rays: camera.rays(origin), size, near: near as f32, far: (far * 1.000_001) as f32 }
-}
-
-/// A picture of which each pixel is the mean of `finer`² of `color`.
-fn halved(color: &[[f32; 4]], (width, height): (u32, u32), finer: u32) -> Vec<[f32; 4]> {
-    if finer == 1 {
-        return color.to_vec();
-    }
-    let (width, finer) = (width as usize, finer as usize);
-    let part = 1.0 / (finer * finer) as f32;
-    let pixel = |i: usize| {
-        let [x, y] = [i % width * finer, i / width * finer];
-        let rows = (y..y + finer).map(|y| &color[y * width * finer + x..][..finer]);
-        let sum = rows.flatten().fold([0.0; 4], |s: [f32; 4], c| [0, 1, 2, 3].map(|i| s[i] + c[i]));
-        sum.map(|s| s * part)
-    };
-    (0..width * height as usize).map(pixel).collect()
 }
 
 /// Adds what is known of each pixel besides its colour.

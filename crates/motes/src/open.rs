@@ -8,8 +8,9 @@ use glam::DVec3;
 use motes_frame::scene_in_png;
 use motes_particles::read::{Input, open_input};
 use motes_particles::{Place, ReadError, Series};
-use motes_scene::{ColorBy, Scene};
+use motes_scene::{ColorBy, Scene, Sph};
 
+use crate::simulate::Simulated;
 use crate::{Error, Result};
 
 /// The source that needs no file: an antibody, PDB entry 1IGY.
@@ -20,13 +21,21 @@ const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// No scene is longer, and a picture's scene stands before its pixels.
 const SCENE_BYTES: u64 = 32 << 20;
 
-/// Opens a source: a path, a quoted pattern, `demo:…`, or [`BUILT_IN`].
+/// Opens a source: a path, a quoted pattern, `demo:…`, `sim:…` ([`crate::Simulated`]), or [`BUILT_IN`].
 ///
 /// # Errors
-/// As [`Series::open`].
+/// As [`Series::open`]; an unknown scenario or parameter of it.
 pub fn open(source: &str) -> Result<Series> {
-    if source.starts_with("sim:") {
-        return Err(Error::Usage(format!("{source}: simulations are not in this version")));
+    open_with(source, &Sph::default())
+}
+
+/// Opens a source as [`open`] does; simulations with these settings.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(source: &str, sph: &Sph) -> Result<Series> {
+    if let Some(text) = source.strip_prefix("sim:") {
+        return Simulated::series(source, text, sph);
     }
     if source != BUILT_IN {
         return Ok(Series::open(source)?);

@@ -100,7 +100,7 @@ impl Session {
         let pool = pool.transpose().map_err(|e| Error::Usage(format!("threads: {e}")))?;
         let open = |source: &str| match source {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
-            _ => crate::open(source),
+            _ => crate::open_with(source, &scene.sph),
         };
         let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let ranges = vec![None; series.len()];

@@ -441,7 +441,6 @@ fn what_is_not_drawn_is_said_and_what_cannot_be_is_refused() {
     }
     fails(&folder, &["render", "", "-o", "x.png"], 2);
     fails(&folder, &["info", "."], 1);
-    assert!(fails(&folder, &["info", "sim:dam-break"], 2).contains("not in this version"));
     assert!(fails(&folder, &["info", "/dev/null"], 1).contains("pipe or a device"));
 }
 
@@ -561,4 +560,47 @@ fn bench_refuses_what_makes_no_sense() {
         let said = fails(&folder, &[&["bench"], args].concat(), 2);
         assert!(said.contains(word), "{args:?}: {said}");
     }
+}
+
+#[test]
+fn a_simulation_is_a_source_and_is_written() {
+    let folder = folder("simulate");
+    let short = "dam-break?particles=300&seconds=0.12";
+    for end in ["vtk", "npz", "xyz"] {
+        succeeds(&folder, &["simulate", short, "-o", &format!("out_%02d.{end}"), "-q"]);
+        let file = format!("out_03.{end}");
+        let info = succeeds(&folder, &["info", &file, "--json"]);
+        let info: Value = serde_json::from_str(&info).unwrap();
+        assert_eq!(info["particles"], 300, "{end}");
+        let names: Vec<_> =
+            info["properties"].as_array().unwrap().iter().map(|p| &p["name"]).collect();
+        assert!(names.iter().any(|n| *n == "Particle Mask"), "{end}: {names:?}");
+        // The file and the simulation itself make the same picture.
+        let by = ["--color-by", "Density", "--set", "overlay.time=off", "--set", "overlay.box=off"];
+        let of_file = hash(&folder, &[&[file.as_str()][..], &by].concat());
+        let source = format!("sim:{short}");
+        let of_sim = hash(&folder, &[&[source.as_str(), "--frame", "3"][..], &by].concat());
+        // Text has its columns in double precision, and the ends of the colours differ by that.
+        assert!(end == "xyz" || of_file == of_sim, "{end}");
+        assert!(!folder.join(format!("out_04.{end}")).exists());
+    }
+    let on = ["simulate", short, "--restart", "out_03.vtk", "--frame", "1", "-o", "on.vtk", "-q"];
+    succeeds(&folder, &on);
+    let info: Value =
+        serde_json::from_str(&succeeds(&folder, &["info", "on.vtk", "--json"])).unwrap();
+    assert!((info["time"].as_f64().unwrap() - 0.16).abs() < 1e-9);
+
+    assert!(fails(&folder, &["simulate", "dam-brake", "-o", "o_{}.vtk"], 2).contains("dam-break"));
+    assert!(fails(&folder, &["simulate", short, "-o", "o.vtk"], 2).contains("%04d"));
+    assert!(fails(&folder, &["simulate", short, "-o", "o_{}.png"], 2).contains(".npz"));
+    assert!(fails(&folder, &["info", "sim:column?widht=1"], 2).contains("width"));
+    let late = ["simulate", short, "--frame", "9", "-o", "o.vtk"];
+    assert!(fails(&folder, &late, 1).contains("0 to 3"));
+    assert!(
+        fs::read_dir(&folder).unwrap().flatten().all(|f| f
+            .file_name()
+            .to_string_lossy()
+            .starts_with('o')
+            || f.file_name() == "stats.json")
+    );
 }

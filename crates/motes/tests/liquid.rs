@@ -38,6 +38,21 @@ fn the_picture_is_the_same_however_it_is_made() {
 }
 
 #[test]
+fn finer_pixels_are_means() {
+    // A pixel of four is the mean of the four of a picture twice as large, where anything is to be seen.
+    let color = |assignments: &[&str]| render(assignments, 2).raw.color().to_vec();
+    let fine = color(&["image.width=320", "image.height=240"]);
+    let mean = |i: usize| {
+        let [x, y] = [2 * (i % 160), 2 * (i / 160)];
+        let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+        four.map(|(x, y)| fine[y * 320 + x][0]).iter().sum::<f32>() / 4.0
+    };
+    let found = color(&["image.samples=4"]);
+    let off = (0..160 * 120).filter(|i| (found[*i][0] - mean(*i)).abs() > 0.1).count();
+    assert!(off < 160 * 120 / 500, "{off}");
+}
+
+#[test]
 fn layers_agree_with_each_other() {
     let picture = render(&[], 2);
     let (depth, id) = (numbers(&picture, "depth"), numbers(&picture, "id"));
@@ -54,7 +69,13 @@ fn layers_agree_with_each_other() {
 
 #[test]
 fn without_gap_and_smoothing_it_is_the_spheres() {
-    let still = ["surface.smoothing=0", "surface.gap=0", "surface.ball=1", "surface.cull=off"];
+    let still = [
+        "surface.smoothing=0",
+        "surface.gap=0",
+        "surface.ball=1",
+        "surface.drop=1",
+        "surface.cull=off",
+    ];
     let surface = render(&still, 2);
     let spheres = render(&[&still[..], &["renderer=spheres", "light.preset=flat"]].concat(), 2);
     let (a, b) = (numbers(&surface, "depth"), numbers(&spheres, "depth"));
@@ -69,6 +90,20 @@ fn without_gap_and_smoothing_it_is_the_spheres() {
     }
     let all = b.iter().filter(|d| d.is_finite()).count();
     assert!(hits * 1000 > all * 995, "{hits} of {all}");
+}
+
+#[test]
+fn spray_is_drops_or_left_out() {
+    let count = |spray| {
+        let picture = render(&[spray], 2);
+        let kept = picture.stats.particles["splatted"];
+        (kept, numbers(&picture, "thickness").iter().sum::<f64>())
+    };
+    let (kept, volume) = count("surface.drop=2");
+    let (smaller, less) = count("surface.drop=1.24");
+    let (fewer, least) = count("surface.spray=drop");
+    assert!(kept == smaller && fewer < kept, "{kept} {smaller} {fewer}");
+    assert!(least < less && less < volume, "{least} {less} {volume}");
 }
 
 #[test]

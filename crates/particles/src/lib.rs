@@ -2,7 +2,7 @@
 //!
 //! [`Particles`] is one frame: positions, radii, any number of named [`Column`]s, and the simulation
 //! box. [`Series`] gives frames on demand from a *source*: a file, a quoted pattern of files, or a
-//! deterministic `demo:` set. Files are read by the formats of [`read`]. [`select`] finds the particles
+//! deterministic `demo:` set. Files are read by the formats of [`read`] and written by those of [`mod@write`]. [`select`] finds the particles
 //! for which an expression holds.
 //!
 //! Invariant: nothing here knows a camera, a scene or a picture.
@@ -16,6 +16,7 @@ pub mod read;
 mod series;
 mod sim_box;
 mod source;
+pub mod write;
 
 pub use column::{Column, Values};
 pub use error::{Place, ReadError, Result};

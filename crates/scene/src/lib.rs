@@ -49,7 +49,7 @@ pub use motion::Moment;
 pub use resolve::{Background, Resolved};
 pub use scene::{
     Axis, Camera, ColorBy, Coloring, Component, Film, Filter, Image, Keyframe, Light, Overlay,
-    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Renderer, Scene, Show, Spheres,
-    System, Tone,
+    Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Renderer, Scene, Show, Solver,
+    Sph, Spheres, System, Tone,
 };
 pub use settings::{Field, Setting, Shape};

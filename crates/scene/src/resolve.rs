@@ -7,7 +7,7 @@ use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::light::Lights;
-use crate::scene::{Camera, Film, Image, Light, Overlay, Projection, Scene, Spheres, System};
+use crate::scene::{Camera, Film, Image, Light, Overlay, Projection, Scene, Sph, Spheres, System};
 
 /// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -72,6 +72,7 @@ impl Scene {
         check_film(&self.film)?;
         check_spheres(&self.spheres)?;
         crate::surface::check(&self.surface)?;
+        self.sph.check()?;
         check_overlay(&self.overlay)
     }
 }
@@ -238,6 +239,36 @@ fn check_spheres(spheres: &Spheres) -> Result<()> {
     need("spheres.block", block, (1..=64).contains(&block), "1 to 64 cells")
 }
 
+impl Sph {
+    /// Refuses parameters that make no sense.
+    ///
+    /// # Errors
+    /// The parameter's path, what it can be and what it is.
+    pub fn check(&self) -> Result<()> {
+        let (fps, steps, cfl) = (self.fps, self.substeps, self.cfl);
+        need("sph.fps", fps, (1e-3..=1e6).contains(&fps), "0.001 to 1e6 frames per second")?;
+        need("sph.substeps", steps, (1..=10_000).contains(&steps), "1 to 10000 steps")?;
+        need("sph.cfl", cfl, (0.01..=2.0).contains(&cfl), "a number in 0.01 to 2")?;
+        let density = self.density;
+        need("sph.density", density, (1e-3..=1e6).contains(&density), "0.001 to 1e6 kg/m³")?;
+        let numbers = [("sph.viscosity", self.viscosity), ("sph.smoothing", self.smoothing)];
+        for (path, v) in numbers {
+            need(path, v, (0.0..=1e6).contains(&v), "a number in 0 to 1e6")?;
+        }
+        let gravity = self.gravity;
+        let fits = gravity.abs().max_element() <= 1e6 && gravity.is_finite();
+        need("sph.gravity", gravity.to_array(), fits, "components of at most 1e6 m/s²")?;
+        let sound = self.sound_speed;
+        let fits = sound.is_none_or(|c| (1e-3..=1e6).contains(&c));
+        need("sph.sound_speed", sound, fits, "0.001 to 1e6 m/s")?;
+        let tolerance = self.tolerance;
+        let fits = (1e-6..=1.0).contains(&tolerance);
+        need("sph.tolerance", tolerance, fits, "a number in 1e-6 to 1")?;
+        let most = self.iterations;
+        need("sph.iterations", most, (1..=10_000).contains(&most), "1 to 10000 iterations")
+    }
+}
+
 fn check_overlay(overlay: &Overlay) -> Result<()> {
     let size = overlay.text_size;
     need("overlay.text_size", size, size > 0.0 && size <= 0.5, "a number above 0, at most 0.5")
@@ -290,6 +321,15 @@ mod tests {
             (&["surface.ior=0"], "surface.ior"),
             (&["surface.absorption=1,-1,0"], "surface.absorption"),
             (&["surface.depth=65"], "surface.depth"),
+            (&["sph.fps=0"], "sph.fps"),
+            (&["sph.cfl=3"], "sph.cfl"),
+            (&["sph.density=-1"], "sph.density"),
+            (&["sph.viscosity=nan"], "sph.viscosity"),
+            (&["sph.gravity=0,0,inf"], "sph.gravity"),
+            (&["sph.sound_speed=0"], "sph.sound_speed"),
+            (&["sph.tolerance=0"], "sph.tolerance"),
+            (&["sph.iterations=0"], "sph.iterations"),
+            (&["sph.substeps=0"], "sph.substeps"),
             (&["light.direction=0,0,0"], "light.direction"),
             (&["light.softness=-1"], "light.softness"),
             (&["light.position=nan,0,0"], "light.position"),

@@ -28,6 +28,8 @@ settings! {
         spheres: Spheres = Spheres::default(),
         /// The surface renderer.
         surface: Surface = Surface::default(),
+        /// The simulation of liquids, for sim: sources.
+        sph: Sph = Sph::default(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
     }
@@ -246,6 +248,34 @@ settings! {
 }
 
 settings! {
+    /// The simulation of liquids by smoothed particle hydrodynamics, in SI units.
+    pub struct Sph {
+        /// dfsph (divergence-free, incompressible: large steps) or wcsph (weakly compressible: small and cheap steps).
+        solver: Solver = Solver::Dfsph,
+        /// Frames per simulated second.
+        fps: f64 = 25.0,
+        /// Time steps per frame, at the least.
+        substeps: u32 = 1,
+        /// How far in a step the fastest particle may go (wcsph: sound as well), in particle spacings.
+        cfl: f64 = 0.4,
+        /// Density at rest, kg/m³.
+        density: f64 = 1000.0,
+        /// Kinematic viscosity, m²/s; water has 1e-6.
+        viscosity: f64 = 1e-6,
+        /// Numerical viscosity, as Monaghan's α with sound_speed (dfsph too): smooths what the particles cannot resolve.
+        smoothing: f64 = 0.05,
+        /// Gravity, m/s².
+        gravity: DVec3 = DVec3::new(0.0, 0.0, -9.81),
+        /// Speed of sound of wcsph, m/s; none: ten times that of a free fall through the liquid.
+        sound_speed: Option<f64> = None => "44.0",
+        /// dfsph: mean compression at which iterations end, as a part of the density.
+        tolerance: f64 = 0.001,
+        /// dfsph: iterations at the most, for each of its two solvers and time steps.
+        iterations: u32 = 50,
+    }
+}
+
+settings! {
     /// What is drawn over the picture. auto: where it says something.
     pub struct Overlay {
         /// Legend of the colours; auto: when colours mean something.
@@ -336,6 +366,16 @@ words! {
         Project = "project",
         /// By tracing packets.
         Trace = "trace",
+    }
+}
+
+words! {
+    /// How a liquid's pressure is found.
+    pub enum Solver {
+        /// Bender & Koschier 2015.
+        Dfsph = "dfsph",
+        /// From the density, by an equation of state.
+        Wcsph = "wcsph",
     }
 }
 

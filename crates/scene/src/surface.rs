@@ -26,12 +26,14 @@ settings! {
         spans: u32 = 7,
         /// Which particles deep inside are left out: occupancy (cells that all hold particles), count (cells with at least cull_count) or off.
         cull: Culling = Culling::Occupancy,
-        /// Edge of the cells that tell what is inside, in radii of the balls.
-        cull_cell: f64 = 2.3,
+        /// Edge of the cells that tell what is inside and what is spray, in radii of the balls.
+        cull_cell: f64 = 1.5,
         /// Particles that make a cell full, for cull = count.
         cull_count: u32 = 4,
-        /// Drops: what few particles together are: keep (round, as they are) or drop (left out).
+        /// Spray, particles that are nearly alone: keep (as drops) or drop (left out).
         spray: Spray = Spray::Keep,
+        /// Radius of a drop of spray, in radii of its particle: 1.24 has the volume of a cube of two radii.
+        drop: f64 = 1.24,
         /// How columns are held while they are made: intervals (exact) or bits (the paper's grid of layers).
         representation: Representation = Representation::Intervals,
         /// Most layers of the bit grid.
@@ -49,7 +51,7 @@ settings! {
         /// Colour of the liquid where it is opaque or scatters, unless particles have colours.
         color: Color = Color::hex(0x3f86b8),
         /// Boundaries that light goes on from after the first, in refractive mode.
-        depth: u32 = 4,
+        depth: u32 = 2,
         /// Whether rays skip what blocks of columns have in common. Changes the speed, never the picture.
         skip: bool = true,
         /// What is around: sky (a bright day over a tiled floor), none (the background), or the path of an image of all directions (.hdr, .exr, .png).
@@ -116,6 +118,7 @@ words! {
 pub(crate) fn check(surface: &Surface) -> Result<()> {
     let s = surface;
     need("surface.ball", s.ball, positive(s.ball), "a number above 0")?;
+    need("surface.drop", s.drop, positive(s.drop), "a number above 0")?;
     let or_more = |v: Option<f64>| v.is_none_or(not_negative);
     need("surface.gap", s.gap, or_more(s.gap), "a number, 0 or more")?;
     need("surface.smoothing", s.smoothing, or_more(s.smoothing), "a number, 0 or more")?;

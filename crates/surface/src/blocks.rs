@@ -3,7 +3,8 @@
 //! Zirr & Dachsbacher 2015, §6: "ray casting can be accelerated using a hierarchical representation of the
 //! spans akin to mipmapping". A block is a square of [`EDGE`]² columns. Where, at one depth, all its columns
 //! are inside the liquid, or all outside, so is every ray that passes there; the depths between are its
-//! *bands*. A ray that passes no band meets nothing in the block.
+//! *bands*. A ray that passes no band meets nothing in the block. Squares of [`EDGE`]² blocks have bands, too, of
+//! theirs.
 
 use rayon::prelude::*;
 
@@ -30,11 +31,18 @@ struct Block {
     count: usize,
 }
 
+/// The blocks of one size.
+#[derive(Clone, Debug, Default)]
+struct Level {
+    blocks: Vec<Block>,
+    across: usize,
+}
+
 /// The blocks of a picture, with their surfaces: those of a block lie together, for rays that go up and down.
 #[derive(Clone, Debug)]
 pub struct Blocks {
-    blocks: Vec<Block>,
-    across: usize,
+    /// Blocks of columns, and blocks of these.
+    levels: [Level; 2],
     /// Nearness of each surface, block after block, column after column.
     nearness: Vec<f32>,
     /// Where each block begins in it, and the columns of it from there.
@@ -73,30 +81,39 @@ impl Blocks {
                     }
                     columns[i + 1] = (at - begin) as u16;
                 }
-                let block = Block::new((&part[begin..at], &columns), count, &mut events);
+                ends_of_spans((&part[begin..at], &columns), &mut events);
+                let block = Block::new(&mut events, count);
                 blocks.push((block, ((first(row) + begin) as u32, columns)));
             }
             blocks
         };
         let made: Vec<_> = parts.into_par_iter().enumerate().map(row).collect();
         let (blocks, columns) = made.into_iter().flatten().unzip();
-        Self { blocks, across, nearness, columns }
+        let small = Level { blocks, across };
+        let large = small.grouped(down);
+        Self { levels: [small, large], nearness, columns }
     }
 
     /// The nearness of the surfaces of the column (x, y).
     #[inline]
     pub(crate) fn column(&self, [x, y]: [usize; 2]) -> &[f32] {
-        let (first, columns) = &self.columns[y / EDGE * self.across + x / EDGE];
+        let (first, columns) = &self.columns[y / EDGE * self.levels[0].across + x / EDGE];
         let i = y % EDGE * EDGE + x % EDGE;
         &self.nearness
             [*first as usize + columns[i] as usize..*first as usize + columns[i + 1] as usize]
     }
 
-    /// Whether a ray that is `inside` or not meets nothing in the block at (x, y), in blocks, between two
-    /// values of nearness.
+    /// Whether a ray that is `inside` or not meets nothing in the block at (x, y), in blocks of the level,
+    /// between two values of nearness.
     #[inline]
-    pub(crate) fn skips(&self, [x, y]: [usize; 2], [from, to]: [f32; 2], inside: bool) -> bool {
-        let block = &self.blocks[y * self.across + x];
+    pub(crate) fn skips(
+        &self,
+        level: usize,
+        [x, y]: [usize; 2],
+        ([from, to], inside): ([f32; 2], bool),
+    ) -> bool {
+        let level = &self.levels[level];
+        let block = &level.blocks[y * level.across + x];
         let (near, far) = (from.max(to), from.min(to));
         let bands = &block.bands[..block.count];
         // Bands before the ray, and none within it.
@@ -107,31 +124,73 @@ impl Blocks {
     }
 }
 
-/// An end of a span in some column of a block.
+impl Level {
+    /// The blocks of [`EDGE`]² of these, which are `down` from top to bottom.
+    fn grouped(&self, down: usize) -> Self {
+        let across = self.across.div_ceil(EDGE);
+        let group = |(events, i): (&mut Vec<Event>, usize)| {
+            let [x, y] = [i % across * EDGE, i / across * EDGE];
+            events.clear();
+            let mut all = 0;
+            for (x, y) in (y..(y + EDGE).min(down))
+                .flat_map(|y| (x..(x + EDGE).min(self.across)).map(move |x| (x, y)))
+            {
+                all += 1;
+                let block = &self.blocks[y * self.across + x];
+                let mut inside = false;
+                for band in &block.bands[..block.count] {
+                    let out = if inside { -1 } else { 0 };
+                    events.push(Event { nearness: band.near, inside: out, mixed: 1 });
+                    inside = band.inside;
+                    let into = if inside { 1 } else { 0 };
+                    events.push(Event { nearness: band.far, inside: into, mixed: -1 });
+                }
+            }
+            Block::new(events, all)
+        };
+        let blocks = (0..across * down.div_ceil(EDGE))
+            .into_par_iter()
+            .with_min_len(across)
+            .map_init(Vec::new, |events, i| group((events, i)))
+            .collect();
+        Self { blocks, across }
+    }
+}
+
+/// Where parts of a block change: how many more of them are inside behind it, and how many more are neither
+/// inside nor outside throughout.
 #[derive(Clone, Copy)]
 struct Event {
     nearness: f32,
-    enters: bool,
+    inside: i32,
+    mixed: i32,
+}
+
+/// The ends of all spans of some columns.
+fn ends_of_spans((nearness, columns): (&[f32], &[u16]), events: &mut Vec<Event>) {
+    events.clear();
+    for column in columns.windows(2) {
+        let of = &nearness[column[0] as usize..column[1] as usize];
+        events.extend(of.iter().enumerate().map(|(i, n)| Event {
+            nearness: *n,
+            inside: if i % 2 == 0 { 1 } else { -1 },
+            mixed: 0,
+        }));
+    }
 }
 
 impl Block {
-    /// The bands of `all` columns with these surfaces.
-    fn new((nearness, columns): (&[f32], &[u16]), all: usize, events: &mut Vec<Event>) -> Self {
-        events.clear();
-        for column in columns.windows(2) {
-            let of = &nearness[column[0] as usize..column[1] as usize];
-            let event = |(i, n): (usize, &f32)| Event { nearness: *n, enters: i % 2 == 0 };
-            events.extend(of.iter().enumerate().map(event));
-        }
+    /// The bands of a block of `all` parts that change like this.
+    fn new(events: &mut [Event], all: i32) -> Self {
         events.sort_unstable_by(|a, b| b.nearness.total_cmp(&a.nearness));
         let mut block = Self::default();
         let mut open: Option<f32> = None;
-        let mut inside = 0_usize;
+        let (mut inside, mut mixed) = (0, 0);
         for (i, event) in events.iter().enumerate() {
             let near = *open.get_or_insert(event.nearness);
-            // Where a filter let two ends of a column change places, what is odd stays in the band.
-            inside = if event.enters { inside + 1 } else { inside.wrapping_sub(1) };
-            let alike = inside == 0 || inside == all;
+            inside += event.inside;
+            mixed += event.mixed;
+            let alike = mixed == 0 && (inside == 0 || inside == all);
             let last = events.get(i + 1).is_none_or(|next| next.nearness < event.nearness);
             if alike && last {
                 block.push(Band { near, far: event.nearness, inside: inside == all });

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::cull::{Cells, Cube};
 use crate::source::{Gathered, Piece, Source, drawable};
-use crate::{Input, Params};
+use crate::{Input, Params, Spray};
 
 /// The boundary of a liquid: views can be made of it, one after the other.
 #[derive(Debug)]
@@ -69,8 +69,12 @@ impl Boundary {
             .into_par_iter()
             .map_init(<(Gathered, Part)>::default, |(gathered, part), chunk| {
                 let piece = source.piece(chunk, gathered);
-                let keep =
-                    Keep { cells: cells.as_ref(), scale: input.radius_scale, ids: params.ids };
+                let keep = Keep {
+                    cells: cells.as_ref(),
+                    scale: input.radius_scale,
+                    spray: params.spray,
+                    ids: params.ids,
+                };
                 dispatch!(level, simd => keep_part(simd, &keep, &piece, part))
             })
             .collect();
@@ -132,15 +136,23 @@ impl Boundary {
 struct Keep<'a> {
     cells: Option<&'a Cells>,
     scale: f32,
+    spray: Spray,
     ids: bool,
 }
 
 impl Keep<'_> {
-    /// Adds a particle to `memory[*kept]`, unless it cannot be drawn.
+    /// Adds a particle in a cell to `memory[*kept]`, unless it cannot be drawn.
     #[inline(always)]
-    fn add(&self, piece: &Piece<'_>, i: usize, memory: &mut Part, kept: &mut usize) {
+    fn add(&self, piece: &Piece<'_>, (i, cell): (usize, u32), memory: &mut Part, kept: &mut usize) {
         let [x, y, z] = piece.positions[i];
-        let radius = piece.radius(i) * self.scale;
+        let mut radius = piece.radius(i) * self.scale;
+        if self.cells.is_some_and(|cells| cells.is_sparse(cell)) {
+            match self.spray {
+                Spray::Liquid => {}
+                Spray::Drops(part) => radius *= part,
+                Spray::Dropped => return,
+            }
+        }
         // Zero only if all are finite: ∞·0 and NaN·0 are NaN.
         let drawn = (x + y + z) * 0.0 == 0.0 && drawable(radius);
         memory.spheres[*kept] = [x, y, z, radius];
@@ -178,18 +190,19 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
                 left &= left - 1;
                 let (p, radius) = (piece.positions[at + i], piece.radius(at + i) * keep.scale);
                 if !cells.covers(numbers[i], p, radius) {
-                    keep.add(piece, at + i, memory, &mut kept);
+                    keep.add(piece, (at + i, numbers[i]), memory, &mut kept);
                 }
             }
         }
         for i in whole..count {
             let (p, radius) = (piece.positions[i], piece.radius(i) * keep.scale);
-            if !cells.covers(cells.cell(p), p, radius) {
-                keep.add(piece, i, memory, &mut kept);
+            let cell = cells.cell(p);
+            if !cells.covers(cell, p, radius) {
+                keep.add(piece, (i, cell), memory, &mut kept);
             }
         }
     } else {
-        (0..count).for_each(|i| keep.add(piece, i, memory, &mut kept));
+        (0..count).for_each(|i| keep.add(piece, (i, 0), memory, &mut kept));
     }
     Part {
         spheres: memory.spheres[..kept].to_vec(),

@@ -16,6 +16,9 @@
 //!
 //! The inner cells are drawn as cubes, in a few sizes: 2ⁿ cells along each edge, all inner.
 //!
+//! A cell is *sparse* if it holds a particle and, with the 26 around it, no more than [`FEW`] cells do: what
+//! lies there is spray, a drop by itself.
+//!
 //! Cells at the lattice's border count as empty, so that whatever lies beyond changes nothing.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,10 +30,12 @@ use motes_grid::{BATCH, Places, Radii, Rows, of_points};
 use rayon::prelude::*;
 
 use crate::source::{Gathered, Piece, Source, Survey, drawable};
-use crate::{Cull, Params};
+use crate::{Cull, Params, Spray};
 
 /// Most cells: 32 MiB of bits. A box that needs more, since it is nearly empty, has no inner cells.
 const MOST_CELLS: f64 = (1u64 << 28) as f64;
+/// Cells with particles around a drop, its own among them. Over a sheet there are nine, along an edge six.
+const FEW: u32 = 5;
 /// Bytes that the threads' own copies of the bits may need together.
 const COPIES_BYTES: usize = 1 << 26;
 /// Sizes of cubes: up to 16 cells along an edge.
@@ -58,6 +63,8 @@ pub(crate) struct Cells {
     places: Places,
     inner: Bits,
     deep: Bits,
+    /// None where spray is as everything else.
+    sparse: Option<Bits>,
 }
 
 /// Cubes of inner cells: place of the first cell along x, y, z, and cells along an edge.
@@ -71,7 +78,8 @@ impl Cells {
         params: &Params,
         level: Level,
     ) -> Option<Self> {
-        if params.cull == Cull::Off || survey.count == 0 {
+        let tells_spray = params.spray != Spray::Liquid;
+        if params.cull == Cull::Off && !tells_spray || survey.count == 0 {
             return None;
         }
         let edge = params.cell * survey.mean_radius;
@@ -89,14 +97,21 @@ impl Cells {
         let low = survey.low - edge;
         let places = Places::new(low, edge, dims);
         let lattice = Lattice { places, dims, filling: 0.5 * survey.mean_radius };
-        let mut full = match params.cull {
-            Cull::Count(least) => lattice.count(source, least.clamp(1, 255) as u8, level),
-            _ => lattice.occupy(source, level),
+        let occupied =
+            (tells_spray || params.cull == Cull::Occupancy).then(|| lattice.occupy(source, level));
+        let sparse = occupied.as_ref().filter(|_| tells_spray).map(Bits::sparse);
+        let full = match params.cull {
+            Cull::Count(least) => Some(lattice.count(source, least.clamp(1, 255) as u8, level)),
+            Cull::Occupancy => occupied,
+            Cull::Off => None,
         };
-        full.clear_border(x as usize);
-        let inner = full.eroded();
-        let deep = inner.eroded();
-        Some(Self { low, edge, places, inner, deep })
+        let (mut inner, mut deep) = (Bits::default(), Bits::default());
+        if let Some(mut full) = full {
+            full.clear_border(x as usize);
+            inner = full.eroded();
+            deep = inner.eroded();
+        }
+        Some(Self { low, edge, places, inner, deep, sparse })
     }
 
     /// How many cells there are, and how many are inner.
@@ -107,7 +122,8 @@ impl Cells {
 
     /// Bytes it holds.
     pub fn bytes(&self) -> usize {
-        (self.inner.bits.len() + self.deep.bits.len()) * 8
+        let sparse = self.sparse.as_ref().map_or(0, |s| s.bits.len());
+        (self.inner.bits.len() + self.deep.bits.len() + sparse) * 8
     }
 
     /// The inner cells as cubes, each cell in one.
@@ -134,6 +150,12 @@ impl Cells {
     /// Constants of [`of_points`] for its places.
     pub fn rows(&self) -> Rows {
         self.places.in_rows()
+    }
+
+    /// Whether a cell is sparse.
+    #[inline(always)]
+    pub fn is_sparse(&self, cell: u32) -> bool {
+        self.sparse.as_ref().is_some_and(|sparse| sparse.get(cell))
     }
 
     /// Whether a sphere of this radius lies within inner cells if its centre's cell is deep.
@@ -362,6 +384,26 @@ impl Bits {
         eroded
     }
 
+    /// The set cells that have, with themselves, no more than [`FEW`] set cells around them.
+    fn sparse(&self) -> Self {
+        let plane = self.words * self.rows;
+        let mut sparse = self.clone();
+        sparse.bits.par_chunks_mut(plane).enumerate().for_each(|(z, to)| {
+            for y in 0..self.rows {
+                // Beyond the box, too, there is nothing.
+                let near = |dy: usize, dz: usize| match (y + dy, z + dz) {
+                    (0, _) | (_, 0) => &[][..],
+                    (y, z) => self.row(y - 1, z - 1),
+                };
+                let rows = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|i| near(i % 3, i / 3));
+                for (w, to) in to[y * self.words..(y + 1) * self.words].iter_mut().enumerate() {
+                    *to &= few(&rows, w);
+                }
+            }
+        });
+        sparse
+    }
+
     /// Cells of twice the edge, set where all eight are.
     fn halved(&self) -> Self {
         let [words, rows, planes] =
@@ -408,6 +450,28 @@ fn erode_row(from: &[u64], to: &mut [u64]) {
     }
 }
 
+/// The cells of word `w` around which no more than [`FEW`] of nine rows are set: all 64 are counted at once, in
+/// binary, one word for each digit.
+fn few(rows: &[&[u64]; 9], w: usize) -> u64 {
+    let (mut ones, mut twos, mut fours, mut more) = (0, 0, 0, 0);
+    for row in rows {
+        let word = |w: usize| row.get(w).copied().unwrap_or(0);
+        let own = word(w);
+        let before = if w > 0 { word(w - 1) >> 63 } else { 0 };
+        for bits in [own, own << 1 | before, own >> 1 | word(w + 1) << 63] {
+            let carry = ones & bits;
+            ones ^= bits;
+            let carry_on = twos & carry;
+            twos ^= carry;
+            more |= fours & carry_on;
+            fours ^= carry_on;
+        }
+    }
+    // Six and seven are more, too.
+    const { assert!(FEW == 5) };
+    !(more | fours & twos)
+}
+
 /// Bits 0, 2, 4 … of a word, side by side.
 fn even_bits(word: u64) -> u64 {
     let mut w = word & 0x5555_5555_5555_5555;
@@ -427,4 +491,47 @@ fn twice(word: u64) -> u64 {
     w = (w | w << 2) & 0x3333_3333_3333_3333;
     w = (w | w << 1) & 0x5555_5555_5555_5555;
     w | w << 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_cells_are_counted_one_by_one() {
+        let (words, rows, planes) = (2, 5, 4);
+        let mut random = 5_u64;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            random >> 32
+        };
+        // An eighth to a quarter of all cells, so that numbers around the limit are frequent.
+        let mut word = || (0..64).fold(0, |w, i| w | u64::from(next() % 6 == 0) << i);
+        let bits = Bits {
+            words,
+            rows,
+            planes,
+            bits: (0..words * rows * planes).map(|_| word()).collect(),
+        };
+        let set = |x: usize, y: usize, z: usize| {
+            bits.row(y, z).get(x / 64).is_some_and(|w| w >> (x % 64) & 1 == 1)
+        };
+        let sparse = bits.sparse();
+        let mut found = 0;
+        for (x, y, z) in
+            (0..planes).flat_map(|z| (0..rows).flat_map(move |y| (0..128).map(move |x| (x, y, z))))
+        {
+            let mut count = 0;
+            for (dx, dy, dz) in (0..27_usize).map(|i| (i % 3, i / 3 % 3, i / 9)) {
+                let near = (x + dx).checked_sub(1).zip((y + dy).checked_sub(1));
+                let near = near.zip((z + dz).checked_sub(1));
+                count += u32::from(near.is_some_and(|((x, y), z)| set(x, y, z)));
+            }
+            let expected = set(x, y, z) && count <= FEW;
+            let word = sparse.row(y, z)[x / 64];
+            assert_eq!(word >> (x % 64) & 1 == 1, expected, "({x}, {y}, {z}): {count}");
+            found += u32::from(expected);
+        }
+        assert!(found > 50, "{found}");
+    }
 }

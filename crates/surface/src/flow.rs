@@ -161,7 +161,8 @@ mod tests {
                 let w = 0.1 + 1e-4 * x as f32 + 2e-4 * y as f32;
                 if projection == Projection::Perspective { 1.0 / w } else { 30.0 * w }
             };
-            let rough = |x: u32, y: u32| tilted(x, y) - if (x + y) % 2 == 0 { 0.02 } else { 0.0 };
+            let rough =
+                |x: u32, y: u32| tilted(x, y) - if (x + y).is_multiple_of(2) { 0.02 } else { 0.0 };
             for (entry, most) in [(&tilted as &dyn Fn(u32, u32) -> f32, 1e-3), (&rough, 0.015)] {
                 let spans = sheet(SIZE, entry);
                 let mut values = nearness(&spans, projection);

@@ -149,20 +149,16 @@ fn march_over<C: Columns>((surfaces, columns): (&Surfaces, &C), ray: &Ray) -> (O
     let mut pixel = [0, 1].map(|i| at[i].clamp(0, size[i] - 1));
     let step = [0, 1].map(|i| if line.change[i] > 0.0 { 1 } else { -1 });
     let mut walk = Walk { surfaces, columns, ray, line, before: None };
-    let (mut u, mut count, mut tried) = (0.0_f32, 0, [-1; 2]);
+    let (mut u, mut count, mut tried) = (0.0_f32, 0, [[-1; 2]; 2]);
     loop {
         if let Some(blocks) = columns.blocks().filter(|_| count > 0) {
-            let block = pixel.map(|p| p / EDGE as i32);
-            if tried != block {
-                tried = block;
-                match line.skip((blocks, ray.inside), (pixel, u), size) {
-                    Skip::Not => {}
-                    Skip::Out => return (None, count),
-                    Skip::To { last, next, at } => {
-                        walk.before = Some(last);
-                        (pixel, u) = (next, at);
-                        continue;
-                    }
+            match line.skip((blocks, ray.inside), (pixel, u), (size, &mut tried)) {
+                Skip::Not => {}
+                Skip::Out => return (None, count),
+                Skip::To { last, next, at } => {
+                    walk.before = Some(last);
+                    (pixel, u) = (next, at);
+                    continue;
                 }
             }
         }
@@ -195,14 +191,36 @@ enum Skip {
 }
 
 impl Line {
-    /// Whether the line meets nothing between `u`, where it is in `pixel`, and the end of that block.
+    /// Whether the line meets nothing between `u`, where it is in `pixel`, and the end of that block: the
+    /// largest that was not `tried` before.
+    #[inline]
     fn skip(
+        &self,
+        of: (&Blocks, bool),
+        from: ([i32; 2], f32),
+        (size, tried): ([i32; 2], &mut [[i32; 2]; 2]),
+    ) -> Skip {
+        for level in [1, 0] {
+            let edge = (EDGE as i32).pow(level as u32 + 1);
+            let block = from.0.map(|p| p / edge);
+            if tried[level] != block {
+                tried[level] = block;
+                match self.skip_block(of, from, (size, level)) {
+                    Skip::Not => {}
+                    skip => return skip,
+                }
+            }
+        }
+        Skip::Not
+    }
+
+    fn skip_block(
         &self,
         (blocks, inside): (&Blocks, bool),
         (pixel, u): ([i32; 2], f32),
-        size: [i32; 2],
+        (size, level): ([i32; 2], usize),
     ) -> Skip {
-        let edge = EDGE as i32;
+        let edge = (EDGE as i32).pow(level as u32 + 1);
         let block = pixel.map(|p| p / edge);
         let step = [0, 1].map(|i| if self.change[i] > 0.0 { 1 } else { -1 });
         let border = [0, 1].map(|i| (block[i] + step[i].max(0)) * edge);
@@ -210,13 +228,20 @@ impl Line {
         let axis = usize::from(next[1] < next[0]);
         let at = next[axis].clamp(u, 1.0);
         let range = [u, at].map(|u| self.start[2] + self.change[2] * u);
-        if !blocks.skips(block.map(|b| b as usize), range, inside) {
+        if !blocks.skips(level, block.map(|b| b as usize), (range, inside)) {
             return Skip::Not;
         }
         // The pixel on the other axis is the one that a walk from column to column comes to.
         let across = 1 - axis;
         let mut last = pixel;
         last[axis] = border[axis] - step[axis].max(0);
+        // Near to it by arithmetic, then exactly.
+        let guess = self.start[across] + self.change[across] * at;
+        let guess = (guess.floor() as i32 - step[across] * 2)
+            .clamp(block[across] * edge, block[across] * edge + edge - 1);
+        if (guess - last[across]) * step[across] > 0 {
+            last[across] = guess;
+        }
         while last[across] != border[across] - step[across].max(0) {
             let wall = self.reaches(across, (last[across] + step[across].max(0)) as f32);
             // Of two walls at one place the first axis is crossed first.
@@ -228,7 +253,9 @@ impl Line {
         }
         let mut next_pixel = last;
         next_pixel[axis] += step[axis];
-        if next[axis] >= 1.0 || next_pixel[axis] < 0 || next_pixel[axis] >= size[axis] {
+        // A block at the picture's edge may reach beyond it, on both axes.
+        let left = (0..2).any(|i| next_pixel[i] < 0 || next_pixel[i] >= size[i]);
+        if next[axis] >= 1.0 || left {
             return Skip::Out;
         }
         Skip::To { last, next: next_pixel, at }
@@ -272,10 +299,7 @@ impl<C: Columns> Walk<'_, C> {
         let away = end < q;
         loop {
             let next = if away { Some(count) } else { count.checked_sub(1) };
-            let Some(next) = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))
-            else {
-                return None;
-            };
+            let next = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))?;
             count = if away { count + 1 } else { count - 1 };
             if (count % 2 == 1) != self.ray.inside {
                 let u = (list[next] - self.line.start[2]) / self.line.change[2];

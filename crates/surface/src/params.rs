@@ -32,6 +32,8 @@ pub struct Params {
     pub cull: Cull,
     /// Edge of the cells that tell what is inside, in mean radii of the particles (scaled).
     pub cell: f32,
+    /// What becomes of particles by themselves.
+    pub spray: Spray,
     /// How a column is held while it is made.
     pub representation: Representation,
     /// Pixels along a tile's edge: a multiple of 4, at most 1024.
@@ -50,6 +52,17 @@ pub enum Cull {
     Count(u32),
     /// No cell is: the liquid is the spheres alone.
     Off,
+}
+
+/// What becomes of spray: particles with few others in the cells around them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spray {
+    /// The same as of all others.
+    Liquid,
+    /// Their radii, scaled like all, are multiplied by this: drops as large as what a particle stands for.
+    Drops(f32),
+    /// They are left out.
+    Dropped,
 }
 
 /// How a column is held while it is made.
@@ -88,6 +101,7 @@ impl Default for Params {
             spans: 7,
             cull: Cull::Occupancy,
             cell: 2.3,
+            spray: Spray::Liquid,
             representation: Representation::Intervals,
             tile: 64,
             ids: false,

@@ -11,9 +11,9 @@ use motes_scene::{Beyond, Lights, Sight, optics};
 use rayon::prelude::*;
 
 use crate::occlusion::Occlusion;
-use crate::refract;
+use crate::refract::Paths;
 use crate::shadow::Shadow;
-use crate::{Spans, Surfaces};
+use crate::{Blocks, Spans, Surfaces};
 
 /// How the liquid is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,38 +115,82 @@ impl Add for Work {
 
 /// The picture: linear, premultiplied colours, row by row.
 pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
-    shade_counted(surfaces, optics, around).0
+    shade_finer(surfaces, optics, around, 1).0
 }
 
-/// As [`shade`], and what was done for it.
-pub fn shade_counted(
+/// A picture of fewer pixels, and what was done for it: each is the mean of `finer`² of the surfaces', or, where
+/// it differs little from all eight around it, the first of them.
+pub fn shade_finer(
     surfaces: &Surfaces,
     optics: &Optics,
     around: &Around<'_>,
+    finer: u32,
 ) -> (Vec<[f32; 4]>, Work) {
-    let width = surfaces.view.size.0 as usize;
-    let blocks = (optics.mode == Mode::Refractive && optics.skip)
-        .then(|| crate::blocks::Blocks::new(surfaces));
-    let mut color = vec![[0.0; 4]; surfaces.view.pixels()];
-    let rows = color.par_chunks_mut(width).enumerate();
-    let work = rows.map(|(y, row)| {
-        let paths = refract::Paths::new(surfaces, (optics, around), blocks.as_ref());
+    let finer = finer.max(1) as usize;
+    let [width, height] =
+        [surfaces.view.size.0 as usize / finer, surfaces.view.size.1 as usize / finer];
+    let blocks = (optics.mode == Mode::Refractive && optics.skip).then(|| Blocks::new(surfaces));
+    let paths = || Paths::new(surfaces, (optics, around), blocks.as_ref());
+    let mut first = vec![[0.0; 4]; width * height];
+    let rows = first.par_chunks_mut(width.max(1)).enumerate().map(|(y, row)| {
+        let paths = paths();
         for (x, color) in row.iter_mut().enumerate() {
-            let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
-            let spread = surfaces.view.rays.pixel;
-            let pixel = Pixel { index: y * width + x, place: [x, y], origin, direction, spread };
-            *color = match (surfaces.of(pixel.index).is_empty(), optics.mode) {
-                (true, _) => nothing(&pixel, around),
-                (_, Mode::Front) => front(surfaces, &pixel, around),
-                (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
-                (_, Mode::Refractive) => paths.pixel(&pixel),
-            }
-            .to_array();
+            *color = color_of([x * finer, y * finer], &paths);
         }
         paths.work.get()
     });
-    let work = work.reduce(Work::default, Work::add);
-    (color, work)
+    let work = rows.reduce(Work::default, Work::add);
+    if finer == 1 {
+        return (first, work);
+    }
+    let mut color = first.clone();
+    let rows = color.par_chunks_mut(width.max(1)).enumerate().map(|(y, row)| {
+        let paths = paths();
+        for (x, color) in row.iter_mut().enumerate() {
+            let xs = x.saturating_sub(1)..(x + 2).min(width);
+            let mut near = (y.saturating_sub(1)..(y + 2).min(height))
+                .flat_map(|y| xs.clone().map(move |x| y * width + x));
+            if near.any(|i| differ(first[i], *color)) {
+                *color = mean([x, y], (*color, finer), &paths);
+            }
+        }
+        paths.work.get()
+    });
+    let finer_work = rows.reduce(Work::default, Work::add);
+    (color, work + finer_work)
+}
+
+/// The mean of `finer`² pixels, of which the first has the colour `first`.
+fn mean([x, y]: [usize; 2], (first, finer): ([f32; 4], usize), paths: &Paths<'_>) -> [f32; 4] {
+    let mut sum = Vec4::from_array(first);
+    for i in 1..finer * finer {
+        let place = [x * finer + i % finer, y * finer + i / finer];
+        sum += Vec4::from_array(color_of(place, paths));
+    }
+    (sum / (finer * finer) as f32).to_array()
+}
+
+/// Whether two colours differ to the eye, whose scale is nearly that of square roots.
+fn differ(a: [f32; 4], b: [f32; 4]) -> bool {
+    const SEEN: f32 = 0.03;
+    (0..4).any(|i| (a[i].clamp(0.0, 1.0).sqrt() - b[i].clamp(0.0, 1.0).sqrt()).abs() > SEEN)
+}
+
+/// The colour of the pixel (x, y) of the surfaces' view.
+fn color_of(place: [usize; 2], paths: &Paths<'_>) -> [f32; 4] {
+    let Paths { surfaces, optics, around, .. } = *paths;
+    let [x, y] = place;
+    let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
+    let spread = surfaces.view.rays.pixel;
+    let index = y * surfaces.view.size.0 as usize + x;
+    let pixel = Pixel { index, place, origin, direction, spread };
+    match (surfaces.of(index).is_empty(), optics.mode) {
+        (true, _) => nothing(&pixel, around),
+        (_, Mode::Front) => front(surfaces, &pixel, around),
+        (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
+        (_, Mode::Refractive) => paths.pixel(&pixel),
+    }
+    .to_array()
 }
 
 /// A pixel and its ray.

@@ -21,7 +21,7 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// A file, a quoted pattern of files, or demo:KIND:N
+    /// A file, a quoted pattern of files, demo:KIND:N or sim:SCENARIO
     source: String,
     /// Print JSON
     #[arg(long)]

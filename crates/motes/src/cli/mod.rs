@@ -6,6 +6,7 @@ mod info;
 mod meter;
 mod render;
 mod scene;
+mod simulate;
 mod talk;
 mod values;
 
@@ -48,6 +49,8 @@ enum Verb {
     Render(Box<render::Args>),
     /// Print the scene: every parameter, its default and its meaning
     Scene(scene::Args),
+    /// Simulate a liquid and write its frames
+    Simulate(simulate::Args),
     /// Measure: the papers' tables, or one source
     Bench(Box<bench::Args>),
     /// Print a completion script for a shell
@@ -84,6 +87,7 @@ fn run(cli: Cli) -> Result<(), Failure> {
         Verb::Info(args) => info::run(&args, cli.talk),
         Verb::Render(args) => render::run(&args, cli.talk),
         Verb::Scene(args) => scene::run(&args),
+        Verb::Simulate(args) => simulate::run(&args, cli.talk),
         Verb::Bench(args) => bench::run(&args, cli.talk),
         Verb::Completions { shell } => {
             let mut script = Vec::new();

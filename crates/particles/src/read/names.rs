@@ -59,6 +59,8 @@ pub const HETATM: &str = "HETATM";
 pub const ANGULAR_MOMENTUM: &str = "Angular Momentum";
 /// Dipole moment, three components.
 pub const DIPOLE: &str = "Dipole Orientation";
+/// How much of the surroundings is filled, in six directions: +x, −x, +y, −y, +z, −z.
+pub const PARTICLE_MASK: &str = "Particle Mask";
 /// Torque, three components.
 pub const TORQUE: &str = "Torque";
 
@@ -105,6 +107,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
     (TRANSPARENCY, &["transparency"]),
     (ORIENTATION, &["orientation", "quaternion", "quat"]),
     (NORMAL, &["normal", "normals"]),
+    (PARTICLE_MASK, &["particle mask", "particle_mask"]),
     (DIPOLE, &["dipole orientation", "dipole", "mu"]),
 ];
 
@@ -157,6 +160,7 @@ pub fn standard_of(name: &str, components: usize) -> Option<&'static str> {
         RADIUS | PARTICLE_TYPE | PARTICLE_IDENTIFIER | MOLECULE_IDENTIFIER => 1,
         MASS | CHARGE | TRANSPARENCY => 1,
         ORIENTATION => 4,
+        PARTICLE_MASK => 6,
         _ => 3,
     };
     (components == expected).then_some(standard)

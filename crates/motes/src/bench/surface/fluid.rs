@@ -131,7 +131,8 @@ impl Fluid {
         };
         let hash = |color: &[[f32; 4]]| {
             let pixels: Vec<u32> = color.iter().map(pack).collect();
-            hash(view.size, &pixels)
+            let finer = liquid.finer();
+            hash((view.size.0 / finer, view.size.1 / finer), &pixels)
         };
         let (ms, frame) = timed(|| {
             let surfaces = liquid.surfaces((boundary, &params), view, &mut stats);

@@ -1,0 +1,98 @@
+//! The weakly compressible solver: pressure from density, by an equation of state.
+//!
+//! ρ_i = Σ_j m W_ij,  p = c² ρ₀ / 7 · ((ρ/ρ₀)⁷ − 1), 0 at the least (Becker & Teschner 2007, Eq. 9),
+//! dv_i/dt = −Σ_j m (p_i/ρ_i² + p_j/ρ_j²) ∇W_ij + viscosity + gravity,
+//! and walls by Akinci et al. 2012, Eq. 9. The step is the symplectic one: velocities, then positions.
+
+use rayon::prelude::*;
+
+use crate::Simulation;
+use crate::fluid::CHUNK;
+use crate::passes::{Density, Force};
+use crate::simulation::{Greatest, Physics};
+
+impl Physics {
+    /// The pressure of the equation of state, pascals.
+    pub(crate) fn pressure(&self, density: f32) -> f32 {
+        let ratio = density / self.density;
+        let square = ratio * ratio;
+        let seventh = square * square * square * ratio;
+        (self.sound * self.sound * self.density / 7.0 * (seventh - 1.0)).max(0.0)
+    }
+
+    /// The pass of forces, and the factor on its sums.
+    pub(crate) fn force(&self) -> (Force, f32) {
+        let scale = self.mass * self.kernel.slope;
+        let force = Force { viscosity: 2.0 * self.viscosity / self.density };
+        (force, scale)
+    }
+}
+
+impl Simulation {
+    /// A step of the weakly compressible solver.
+    pub(crate) fn weakly_compressible(&mut self, secs: f32) -> Greatest {
+        let (around, fluid, physics, stats) = self.parts();
+        let n = fluid.count;
+        let mut sums = std::mem::take(&mut fluid.sums);
+        let [a, b, c, ..] = &mut sums;
+
+        around.of(fluid, physics).sum(Density, [], [&mut a[..n]]);
+        let scale = physics.mass * physics.kernel.value;
+        let parts: Vec<f64> = (
+            fluid.density[..n].par_chunks_mut(CHUNK),
+            fluid.pressure[..n].par_chunks_mut(CHUNK),
+            a[..n].par_chunks(CHUNK),
+        )
+            .into_par_iter()
+            .map(|(densities, pressures, sums)| {
+                let mut excess = 0.0;
+                for ((density, pressure), sum) in densities.iter_mut().zip(pressures).zip(sums) {
+                    *density = scale * (1.0 + sum);
+                    *pressure = physics.pressure(*density) / (*density * *density);
+                    excess += f64::from((*density / physics.density - 1.0).max(0.0));
+                }
+                excess
+            })
+            .collect();
+        stats.compression = parts.iter().sum::<f64>() / n.max(1) as f64;
+
+        let [u, v, w] = &fluid.velocity;
+        let (force, scale) = physics.force();
+        let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
+        let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
+        around.of(fluid, physics).sum(force, inputs, outputs);
+        let acceleration = accelerate(fluid, physics, ([a, b, c], scale), secs);
+        fluid.sums = sums;
+        Greatest { acceleration, ..Self::move_on(fluid, physics, secs) }
+    }
+}
+
+/// Adds gravity and `scale` times the sums to the velocities. The square of the greatest acceleration.
+pub(crate) fn accelerate(
+    fluid: &mut crate::fluid::Fluid,
+    physics: &Physics,
+    (sums, scale): ([&Vec<f32>; 3], f32),
+    secs: f32,
+) -> f32 {
+    let n = fluid.count;
+    let [u, v, w] = &mut fluid.velocity;
+    let [a, b, c] = sums.map(|row| row[..n].par_chunks(CHUNK));
+    let [g, h, k] = physics.gravity;
+    (
+        (u[..n].par_chunks_mut(CHUNK), v[..n].par_chunks_mut(CHUNK), w[..n].par_chunks_mut(CHUNK)),
+        (a, b, c),
+    )
+        .into_par_iter()
+        .map(|((u, v, w), (a, b, c))| {
+            let mut greatest = 0.0f32;
+            for i in 0..u.len() {
+                let (a, b, c) = (scale * a[i] + g, scale * b[i] + h, scale * c[i] + k);
+                u[i] += secs * a;
+                v[i] += secs * b;
+                w[i] += secs * c;
+                greatest = greatest.max(a * a + b * b + c * c);
+            }
+            greatest
+        })
+        .reduce(|| 0.0, f32::max)
+}
