@@ -10,9 +10,9 @@
 //!
 //! > y(i) = x(i) + a·(y(i ∓ 1) − x(i)),
 //!
-//! once in each direction: each sweep has the variance a/(1 − a)², so that with [`ROUNDS`] rounds and the
+//! once in each direction: each sweep has the variance a/(1 − a)², so that with `ROUNDS` rounds and the
 //! standard deviation σ pixels, a/(1 − a)² = v = σ²/(2·ROUNDS) and a = (1 + 2·v − √(1 + 4·v)) / (2·v).
-//! A sweep begins anew where a surface ends, and where it leaps by more than [`LEAP`] σ from one pixel to
+//! A sweep begins anew where a surface ends, and where it leaps by more than `LEAP` σ from one pixel to
 //! the next, as what lies there before something else is not smeared over it. What is no thicker than a ball,
 //! a drop, stays round; from there on smoothing sets in with thickness.
 
