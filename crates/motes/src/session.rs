@@ -197,6 +197,10 @@ impl Session {
             ));
         }
 
+        if self.scene.renderer == Renderer::Surface && loaded.len() > 1 {
+            self.notes
+                .push("renderer surface: the first system is drawn, the others are not".into());
+        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;

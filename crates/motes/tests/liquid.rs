@@ -137,6 +137,18 @@ fn nothing_visible_is_no_liquid() {
 }
 
 #[test]
+fn systems_that_are_not_drawn_are_told() {
+    let mut scene = Scene::default();
+    scene.set_sources(&["demo:dam:1000".into(), "demo:packed:1000".into()]);
+    for assignment in ["renderer=surface", "image.width=8", "image.height=8"] {
+        scene.set_text(assignment).unwrap();
+    }
+    let mut session = Session::open(scene, Some(1)).unwrap();
+    session.render(0, Layers::No, &Quiet).unwrap();
+    assert!(session.warnings().iter().any(|w| w.contains("first system")));
+}
+
+#[test]
 fn a_panorama_that_is_none_is_an_error() {
     let mut scene = Scene::default();
     scene.set_sources(&["demo:dam:1000".into()]);
