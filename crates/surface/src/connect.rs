@@ -124,6 +124,7 @@ fn connect_columns(own: &[f32], next: &[f32], (links, side): (&mut [Links], Side
 }
 
 /// Columns and their surfaces, to be followed along links.
+#[derive(Clone, Copy)]
 pub(crate) struct Net<'a> {
     spans: &'a Spans,
     links: &'a [Links],

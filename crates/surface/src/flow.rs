@@ -22,24 +22,15 @@ pub fn iterate(
     (spans, links): (&Spans, &[Links]),
     (scale, most): (&Scale, u32),
 ) {
-    let times = |nearness: f32| {
-        let sigma = scale.sigma(nearness);
-        ((2.0 * sigma * sigma).round() as u32).min(most)
-    };
     let net = Net::new(spans, links);
-    let greatest = values.iter().map(|n| times(*n)).max().unwrap_or(0);
-    for time in 0..greatest {
-        for sides in [[Side::Left, Side::Right], [Side::Up, Side::Down]] {
-            *values = each((spans, values), |at, old| {
-                let own = old[at.surface];
-                if times(own) <= time {
-                    return own;
-                }
-                let [a, b] = sides.map(|side| old[net.follow(at, side).surface]);
-                0.5 * own + 0.25 * (a + b)
-            });
+    let mean = |sides: [Side; 2]| {
+        move |at: Place, old: &[f32]| {
+            let [a, b] = sides.map(|side| old[net.follow(at, side).surface]);
+            0.5 * old[at.surface] + 0.25 * (a + b)
         }
-    }
+    };
+    let passes = [mean([Side::Left, Side::Right]), mean([Side::Up, Side::Down])];
+    repeat(values, spans, (scale, most), &passes);
 }
 
 /// Smooths `values`, the nearness of each surface, by curvature flow of at most `most` steps.
@@ -49,27 +40,35 @@ pub fn curvature(
     (scale, most): (&Scale, u32),
     view: &View,
 ) {
-    let projection = view.rays.projection;
-    // On what is flat a step has half a pixel² of variance along each axis.
+    let (net, projection) = (Net::new(spans, links), view.rays.projection);
+    let moved = |at: Place, old: &[f32]| {
+        let z = |p: Place| depth(old[p.surface], projection);
+        // From depth to nearness as from nearness to depth.
+        depth(z(at) - step(&net, at, z, view), projection)
+    };
+    repeat(values, spans, (scale, most), &[moved]);
+}
+
+/// Repeats `passes`, each with half a pixel² of variance along its axes, where a surface is near enough for
+/// that many, at most `most` times.
+fn repeat(
+    values: &mut Vec<f32>,
+    spans: &Spans,
+    (scale, most): (&Scale, u32),
+    passes: &[impl Fn(Place, &[f32]) -> f32 + Sync],
+) {
     let times = |nearness: f32| {
         let sigma = scale.sigma(nearness);
         ((2.0 * sigma * sigma).round() as u32).min(most)
     };
-    let net = Net::new(spans, links);
     let greatest = values.iter().map(|n| times(*n)).max().unwrap_or(0);
     for time in 0..greatest {
-        *values = each((spans, values), |at, old| {
-            let own = old[at.surface];
-            if times(own) <= time {
-                return own;
-            }
-            let z = |p: Place| depth(old[p.surface], projection);
-            let moved = z(at) - step(&net, at, z, view);
-            match projection {
-                Projection::Perspective => 1.0 / moved,
-                Projection::Orthographic => -moved,
-            }
-        });
+        for pass in passes {
+            *values = each((spans, values), |at, old| {
+                let own = old[at.surface];
+                if times(own) <= time { own } else { pass(at, old) }
+            });
+        }
     }
 }
 

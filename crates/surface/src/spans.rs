@@ -37,6 +37,14 @@ pub struct Extended {
     pub empty: f32,
 }
 
+impl Extended {
+    /// That of a pixel, in a list in the order of pixels.
+    pub(crate) fn of(list: &[Self], pixel: usize) -> Option<&Self> {
+        let place = list.binary_search_by_key(&(pixel as u32), |e| e.pixel).ok()?;
+        list.get(place)
+    }
+}
+
 impl Spans {
     /// A surface that belongs to no particle: the end of a full cell, or the near or far plane in one.
     pub const NO_PARTICLE: u32 = u32::MAX;
@@ -59,8 +67,7 @@ impl Spans {
 
     /// What a pixel had beyond what is stored, if it had.
     pub fn extended(&self, pixel: usize) -> Option<&Extended> {
-        let place = self.extended.binary_search_by_key(&(pixel as u32), |e| e.pixel).ok()?;
-        self.extended.get(place)
+        Extended::of(&self.extended, pixel)
     }
 
     /// How many spans a pixel truly has.

@@ -101,17 +101,19 @@ impl Surfaces {
         unpack(self.normals[surface])
     }
 
+    /// What a pixel had beyond what is stored, if it had.
+    fn extended(&self, pixel: usize) -> Option<&Extended> {
+        Extended::of(&self.extended, pixel)
+    }
+
     /// What is empty inside the last stored span of a pixel, in depth.
     pub fn empty(&self, pixel: usize) -> f32 {
-        let place = self.extended.binary_search_by_key(&(pixel as u32), |e| e.pixel);
-        place.map_or(0.0, |place| self.extended[place].empty)
+        self.extended(pixel).map_or(0.0, |e| e.empty)
     }
 
     /// How many spans a pixel truly has.
     pub fn count(&self, pixel: usize) -> u32 {
-        let place = self.extended.binary_search_by_key(&(pixel as u32), |e| e.pixel);
-        let stored = self.starts[pixel + 1] - self.starts[pixel];
-        place.map_or(stored, |place| self.extended[place].count)
+        self.extended(pixel).map_or(self.starts[pixel + 1] - self.starts[pixel], |e| e.count)
     }
 
     /// Length inside the liquid, in depth, along the ray of a pixel.

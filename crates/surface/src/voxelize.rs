@@ -10,7 +10,7 @@ use crate::compress::{TileSpans, assemble};
 use crate::intervals::Intervals;
 use crate::items::{Binning, Tiles};
 use crate::layers::Layers;
-use crate::splat::{Easel, Painter, draw};
+use crate::splat::{Columns, Easel, Painter, draw};
 use crate::tile::TileRays;
 use crate::{Marks, Params, Representation, Spans, View};
 
@@ -96,19 +96,8 @@ pub fn splat(boundary: &Boundary, view: &View, params: &Params, level: Level) ->
 
 /// Makes all tiles with intervals.
 fn exact<const IDS: bool>(painter: &Painter<'_>, params: &Params, level: Level) -> Vec<TileSpans> {
-    let most = params.spans.clamp(1, u16::MAX.into()) as usize;
-    let begin = || (Easel::default(), Intervals::<IDS>::new(params.gap.max(0.0)));
-    (0..painter.tiles.count())
-        .into_par_iter()
-        .with_max_len(1)
-        .map_init(begin, |(easel, columns), tile| {
-            if !painter.any(tile) {
-                return empty(painter, tile);
-            }
-            dispatch!(level, simd => draw(simd, painter, tile, easel, columns));
-            columns.finish(&easel.rays, painter.view.size.0, most)
-        })
-        .collect()
+    let columns = || Intervals::<IDS>::new(params.gap.max(0.0));
+    each_tile(painter, (params, level), columns, Intervals::finish)
 }
 
 /// Makes all tiles with bits.
@@ -118,18 +107,32 @@ fn layered(
     (layers, marks): (&Layers, Marks),
     level: Level,
 ) -> Vec<TileSpans> {
+    let columns = || BitColumns::new(layers, marks, params.gap.max(0.0));
+    each_tile(painter, (params, level), columns, BitColumns::finish)
+}
+
+/// Makes all tiles, with columns that `finish` ends: of a tile's rays, the picture's width, and the most spans
+/// of a pixel.
+fn each_tile<C: Columns>(
+    painter: &Painter<'_>,
+    (params, level): (&Params, Level),
+    columns: impl Fn() -> C + Sync + Send,
+    finish: impl Fn(&mut C, &TileRays, u32, usize) -> TileSpans + Sync + Send,
+) -> Vec<TileSpans> {
     let most = params.spans.clamp(1, u16::MAX.into()) as usize;
-    let begin = || (Easel::default(), BitColumns::new(layers, marks, params.gap.max(0.0)));
     (0..painter.tiles.count())
         .into_par_iter()
         .with_max_len(1)
-        .map_init(begin, |(easel, columns), tile| {
-            if !painter.any(tile) {
-                return empty(painter, tile);
-            }
-            dispatch!(level, simd => draw(simd, painter, tile, easel, columns));
-            columns.finish(&easel.rays, painter.view.size.0, most)
-        })
+        .map_init(
+            || (Easel::default(), columns()),
+            |(easel, columns), tile| {
+                if !painter.any(tile) {
+                    return empty(painter, tile);
+                }
+                dispatch!(level, simd => draw(simd, painter, tile, easel, columns));
+                finish(columns, &easel.rays, painter.view.size.0, most)
+            },
+        )
         .collect()
 }
 
