@@ -24,6 +24,8 @@ use crate::traverse::{Counts, Spheres};
 
 /// Parts along a tile's side whose greatest distance is kept: two blocks each.
 const PARTS: usize = 8;
+/// Sixteen small spheres show in at most four blocks each; and one place more.
+const MOST_DUE: usize = 128;
 
 /// Draws a system's spheres onto a tile: afterwards `slot` is set where one of them is nearest.
 /// `order` lists the groups that may show in the tile, nearest first.
@@ -45,6 +47,7 @@ pub(crate) fn project<S: Simd>(
         farthest: [f32::INFINITY; PARTS * PARTS],
         farthest_of_all: f32::INFINITY,
         stale: u64::MAX,
+        due: [0; MOST_DUE],
         counts,
     };
     easel.measure(simd);
@@ -82,6 +85,8 @@ struct Easel<'a> {
     farthest_of_all: f32,
     /// The parts whose greatest distance may have become less.
     stale: u64,
+    /// Small spheres of sixteen that are to be tested: lane · 256 + block of the tile.
+    due: [u16; MOST_DUE],
     counts: &'a mut Counts,
 }
 
@@ -252,26 +257,43 @@ impl Easel<'_> {
                 self.counts.spheres += u64::from(may.count_ones());
                 may &= self.frame::<S, PERSPECTIVE>(simd, (run.grid, slot), reach, &mut frames);
             }
+            let mut due = 0;
             while may != 0 {
                 let lane = may.trailing_zeros() as usize;
                 may &= may - 1;
-                let area = frames.area(lane);
-                let near = frames.near[lane];
-                let [x0, x1, y0, y1] = area;
-                // Small ones find out block by block.
-                let small = x1 - x0 < 2 && y1 - y0 < 2;
-                if small || Self::parts(area) & self.open(simd, near) != 0 {
-                    let sphere = Drawn {
-                        x: frames.center[0][lane],
-                        y: frames.center[1][lane],
-                        z: frames.center[2][lane],
-                        r2: frames.r2[lane],
-                        slot: run.first_slot + (slot + lane) as u32,
-                    };
-                    self.draw::<S, PERSPECTIVE>(simd, sphere, (area, near));
+                let [x0, x1, y0, y1] = frames.area(lane);
+                if x1 - x0 < 2 && y1 - y0 < 2 {
+                    due = self.enlist((frames.area(lane), frames.near[lane]), lane, due);
+                } else {
+                    let first_slot = run.first_slot + slot as u32;
+                    self.draw::<S, PERSPECTIVE>(simd, (&frames, lane), first_slot);
                 }
             }
+            for at in 0..due {
+                let (lane, block) = (self.due[at] >> 8, self.due[at] & 255);
+                let slot = run.first_slot + slot as u32 + u32::from(lane);
+                let sphere = frames.sphere(simd, (lane & 15) as usize);
+                self.test::<S, PERSPECTIVE>(simd, (&sphere, slot), block as usize);
+            }
         }
+    }
+
+    /// Notes the blocks of a small area in which a sphere no nearer than `near` may show, after the
+    /// `due` pairs of lane and block that are noted; gives how many there are then. No branches: what
+    /// would be taken cannot be foreseen.
+    #[inline(always)]
+    fn enlist(&mut self, ([x0, x1, y0, y1], near): (Area, f32), lane: usize, due: usize) -> usize {
+        let first = y0 * SIDE_BLOCKS + x0;
+        let (right, down) = (x1 - x0, y1 - y0);
+        let mut due = due;
+        for (dx, dy, there) in
+            [(0, 0, 1), (right, 0, right), (0, down, down), (right, down, right & down)]
+        {
+            let block = (first + dy * SIDE_BLOCKS + dx) % (SIDE_BLOCKS * SIDE_BLOCKS);
+            self.due[due % MOST_DUE] = (lane << 8 | block) as u16;
+            due += there & usize::from(near < self.limit[block]);
+        }
+        due
     }
 
     /// Least distances and areas of the sixteen spheres from `slot` on; gives which may show at all.
@@ -350,57 +372,69 @@ impl Easel<'_> {
         may
     }
 
-    /// Tests the rays of an area against one sphere no nearer than `near` and keeps nearer hits. At
-    /// equal distance the lower index in the file wins, and an earlier system before a later.
+    /// Draws a large sphere of sixteen, whose slots begin at `first_slot`.
     #[inline(always)]
     fn draw<S: Simd, const PERSPECTIVE: bool>(
         &mut self,
         simd: S,
-        sphere: Drawn,
-        (area, near): (Area, f32),
+        (frames, lane): (&Frames, usize),
+        first_slot: u32,
     ) {
+        let (area, near) = (frames.area(lane), frames.near[lane]);
+        if !self.shows(simd, area, near) {
+            return;
+        }
+        let sphere = frames.sphere(simd, lane);
         let [x0, x1, y0, y1] = area;
-        let r2 = f32x16::splat(simd, sphere.r2);
-        let cx = f32x16::splat(simd, sphere.x);
-        let cy = f32x16::splat(simd, sphere.y);
-        let cz = f32x16::splat(simd, sphere.z);
-        let (mut ox, mut oy, mut oz) = (cx, cy, cz);
         for y in y0..=y1 {
             for x in x0..=x1 {
                 let block = y * SIDE_BLOCKS + x;
-                if near >= self.limit[block] {
-                    continue;
-                }
-                let at = block * LANES;
-                let lanes = at..at + LANES;
-                if !PERSPECTIVE {
-                    let [px, py, pz] = &self.tile.origin;
-                    ox = cx - f32x16::from_slice(simd, &px[lanes.clone()]);
-                    oy = cy - f32x16::from_slice(simd, &py[lanes.clone()]);
-                    oz = cz - f32x16::from_slice(simd, &pz[lanes.clone()]);
-                }
-                self.counts.tests += LANES as u64;
-                let dx = f32x16::from_slice(simd, &self.tile.direction[0][lanes.clone()]);
-                let dy = f32x16::from_slice(simd, &self.tile.direction[1][lanes.clone()]);
-                let dz = f32x16::from_slice(simd, &self.tile.direction[2][lanes.clone()]);
-                let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
-                let before = f32x16::from_slice(simd, &self.tile.distance[lanes.clone()]);
-                let nearer = hit & distance.simd_lt(before);
-                let ties = (hit & distance.simd_eq(before)).to_bitmask();
-                if nearer.any_true() {
-                    self.stale |= 1 << (y / 2 * PARTS + x / 2);
-                    let nearest = nearer.select(distance, before);
-                    nearest.store_slice(&mut self.tile.distance[lanes.clone()]);
-                    self.limit[block] = nearest.reduce_max();
-                    let slots = u32x16::from_slice(simd, &self.tile.slot[lanes.clone()]);
-                    nearer
-                        .select(u32x16::splat(simd, sphere.slot), slots)
-                        .store_slice(&mut self.tile.slot[lanes.clone()]);
-                }
-                if ties != 0 {
-                    break_ties(self.spheres, &mut self.tile.slot[lanes], (sphere.slot, ties));
+                if near < self.limit[block] {
+                    let slot = first_slot + lane as u32;
+                    self.test::<S, PERSPECTIVE>(simd, (&sphere, slot), block);
                 }
             }
+        }
+    }
+
+    /// Tests the rays of a block of the tile against one sphere and keeps nearer hits. At equal distance
+    /// the lower index in the file wins, and an earlier system before a later.
+    #[inline(always)]
+    fn test<S: Simd, const PERSPECTIVE: bool>(
+        &mut self,
+        simd: S,
+        (sphere, slot): (&Drawn<S>, u32),
+        block: usize,
+    ) {
+        let at = block * LANES;
+        let lanes = at..at + LANES;
+        let [mut ox, mut oy, mut oz] = sphere.center;
+        if !PERSPECTIVE {
+            let [px, py, pz] = &self.tile.origin;
+            ox -= f32x16::from_slice(simd, &px[lanes.clone()]);
+            oy -= f32x16::from_slice(simd, &py[lanes.clone()]);
+            oz -= f32x16::from_slice(simd, &pz[lanes.clone()]);
+        }
+        self.counts.tests += LANES as u64;
+        let dx = f32x16::from_slice(simd, &self.tile.direction[0][lanes.clone()]);
+        let dy = f32x16::from_slice(simd, &self.tile.direction[1][lanes.clone()]);
+        let dz = f32x16::from_slice(simd, &self.tile.direction[2][lanes.clone()]);
+        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], sphere.r2);
+        let before = f32x16::from_slice(simd, &self.tile.distance[lanes.clone()]);
+        let nearer = hit & distance.simd_lt(before);
+        let ties = hit & distance.simd_eq(before);
+        // Kept without asking whether there are any: the answer comes late, and cannot be foreseen.
+        let nearest = nearer.select(distance, before);
+        nearest.store_slice(&mut self.tile.distance[lanes.clone()]);
+        let slots = u32x16::from_slice(simd, &self.tile.slot[lanes.clone()]);
+        let slots = nearer.select(u32x16::splat(simd, slot), slots);
+        slots.store_slice(&mut self.tile.slot[lanes.clone()]);
+        let limit = nearest.reduce_max();
+        let part = block / SIDE_BLOCKS / 2 * PARTS + block % SIDE_BLOCKS / 2;
+        self.stale |= u64::from(limit < self.limit[block]) << part;
+        self.limit[block] = limit;
+        if ties.any_true() {
+            break_ties(self.spheres, &mut self.tile.slot[lanes], (slot, ties.to_bitmask()));
         }
     }
 }
@@ -416,12 +450,9 @@ struct Run<'a> {
 
 /// A sphere to be drawn: its centre, from where the rays start if they all start at one point, and the
 /// square of its radius.
-struct Drawn {
-    x: f32,
-    y: f32,
-    z: f32,
-    r2: f32,
-    slot: u32,
+struct Drawn<S: Simd> {
+    center: [f32x16<S>; 3],
+    r2: f32x16<S>,
 }
 
 /// Sixteen spheres, their least distances and areas.
@@ -441,6 +472,17 @@ impl Frames {
             near: [0.0; LANES],
             area: [[0; LANES]; 4],
         }
+    }
+
+    #[inline(always)]
+    fn sphere<S: Simd>(&self, simd: S, lane: usize) -> Drawn<S> {
+        let [x, y, z] = &self.center;
+        let center = [
+            f32x16::splat(simd, x[lane]),
+            f32x16::splat(simd, y[lane]),
+            f32x16::splat(simd, z[lane]),
+        ];
+        Drawn { center, r2: f32x16::splat(simd, self.r2[lane]) }
     }
 
     #[inline(always)]
