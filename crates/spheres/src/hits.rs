@@ -1,11 +1,11 @@
 //! The surfaces that the rays of a tile have hit first.
 
-use fearless_simd::{f32x16, prelude::*, u32x16};
+use fearless_simd::{f32x4, f32x8, f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_grid::{Particle, Radii};
+use motes_grid::{Grid, Particle, Radii};
 
-use crate::intersect::transposed;
+use crate::intersect::{columns, transposed};
 use crate::lanes::Lanes;
 use crate::packet::{LANES, NO_SLOT, Surface};
 use crate::render::Center;
@@ -57,27 +57,64 @@ impl Hits {
                 continue;
             }
             count += mask.count_ones() as usize;
-            let mut particles = [Particle::default(); LANES];
-            let mut left = mask;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let slot = rays.hit_slot[first + lane];
-                let (grid, place) = match only {
-                    Some(grid) => (grid, slot as usize),
-                    None => systems[rays.hit_system[first + lane] as usize].locate(slot),
-                };
-                particles[lane] = grid.particles[place];
-                if let Radii::Each(radii) = &grid.radius {
-                    self.radius[first + lane] = radii[place];
-                } else {
-                    self.radius[first + lane] = grid.greatest_radius;
-                }
-                self.index[first + lane] = particles[lane].index;
-            }
-            self.surfaces(simd, rays, (first, transposed(simd, bytemuck::cast_slice(&particles))));
+            let centers = match only {
+                Some(grid) => self.of_grid(simd, (rays, first), grid),
+                None => self.of_any(simd, (rays, first), systems, mask),
+            };
+            self.surfaces(simd, rays, (first, centers));
         }
         count
+    }
+
+    /// Centres of the spheres that a block's rays have hit, all of one grid; the others' are those of any.
+    #[inline(always)]
+    fn of_grid<S: Simd>(
+        &mut self,
+        simd: S,
+        (rays, first): (&RayTile, usize),
+        grid: &Grid,
+    ) -> [f32x16<S>; 3] {
+        let lanes = first..first + LANES;
+        let slots = &rays.hit_slot[lanes.clone()];
+        let [x, y, z, index] = columns([
+            four(simd, grid, &slots[..4]),
+            four(simd, grid, &slots[4..8]),
+            four(simd, grid, &slots[8..12]),
+            four(simd, grid, &slots[12..]),
+        ]);
+        index.bitcast::<u32x16<S>>().store_slice(&mut self.index[lanes.clone()]);
+        match &grid.radius {
+            Radii::Uniform(radius) => self.radius[lanes].fill(*radius),
+            Radii::Each(radii) => {
+                for (radius, slot) in self.radius[lanes].iter_mut().zip(slots) {
+                    *radius = radii[(*slot as usize).min(radii.len() - 1)];
+                }
+            }
+        }
+        [x, y, z]
+    }
+
+    /// Centres of the spheres that a block's rays have hit, of any grid.
+    #[inline(always)]
+    fn of_any<S: Simd>(
+        &mut self,
+        simd: S,
+        (rays, first): (&RayTile, usize),
+        systems: &[Spheres<'_>],
+        mask: u64,
+    ) -> [f32x16<S>; 3] {
+        let mut particles = [Particle::default(); LANES];
+        let mut left = mask;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let system = rays.hit_system[first + lane] as usize;
+            let (grid, place) = systems[system].locate(rays.hit_slot[first + lane]);
+            particles[lane] = grid.particles[place];
+            self.radius[first + lane] = grid.radius_at(place);
+            self.index[first + lane] = particles[lane].index;
+        }
+        transposed(simd, bytemuck::cast_slice(&particles))
     }
 
     /// Positions and normals of a block's hits.
@@ -169,4 +206,19 @@ impl Hits {
             system: rays.hit_system[ray],
         }
     }
+}
+
+/// The particles at four slots of a grid; where there is none, its last.
+#[inline(always)]
+fn four<S: Simd>(simd: S, grid: &Grid, slots: &[u32]) -> f32x16<S> {
+    let particles = &grid.particles[..];
+    let last = particles.len() - 1;
+    let low = two(simd, particles, (slots[0] as usize).min(last), (slots[1] as usize).min(last));
+    low.combine(two(simd, particles, (slots[2] as usize).min(last), (slots[3] as usize).min(last)))
+}
+
+#[inline(always)]
+fn two<S: Simd>(simd: S, particles: &[Particle], a: usize, b: usize) -> f32x8<S> {
+    let low = f32x4::from_slice(simd, bytemuck::cast_slice(&particles[a..=a]));
+    low.combine(f32x4::from_slice(simd, bytemuck::cast_slice(&particles[b..=b])))
 }

@@ -294,11 +294,24 @@ pub(crate) fn sixteen_centers<S: Simd>(simd: S, grid: &Grid, at: usize) -> [f32x
 /// x, y and z of sixteen particles, four numbers each.
 #[inline(always)]
 pub(crate) fn transposed<S: Simd>(simd: S, numbers: &[f32]) -> [f32x16<S>; 3] {
-    // xyzi xyzi … becomes xzxz … and yiyi …, and these x …, z … and y ….
-    let (xz0, yi0) = load(simd, numbers, 0).deinterleave(load(simd, numbers, LANES));
-    let (xz1, yi1) = load(simd, numbers, 2 * LANES).deinterleave(load(simd, numbers, 3 * LANES));
+    let [x, y, z, _] = columns([
+        load(simd, numbers, 0),
+        load(simd, numbers, LANES),
+        load(simd, numbers, 2 * LANES),
+        load(simd, numbers, 3 * LANES),
+    ]);
+    [x, y, z]
+}
+
+/// The four numbers of sixteen particles, of which four are in each vector.
+#[inline(always)]
+pub(crate) fn columns<S: Simd>(fours: [f32x16<S>; 4]) -> [f32x16<S>; 4] {
+    // xyzi xyzi … becomes xzxz … and yiyi …, and these x …, z …, y … and i ….
+    let (xz0, yi0) = fours[0].deinterleave(fours[1]);
+    let (xz1, yi1) = fours[2].deinterleave(fours[3]);
     let (x, z) = xz0.deinterleave(xz1);
-    [x, yi0.unzip_low(yi1), z]
+    let (y, i) = yi0.deinterleave(yi1);
+    [x, y, z, i]
 }
 
 /// Sixteen values from `at` on; past the end the last one repeats.

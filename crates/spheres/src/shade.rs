@@ -116,22 +116,46 @@ pub(crate) fn shade<S: Simd>(
 }
 
 impl Canvas<'_> {
+    /// Adds a block of one sample to a pixel, row by row, if all of it is on the canvas; else gives `false`.
+    #[inline(always)]
+    fn add_whole<S: Simd>(
+        &mut self,
+        pattern: &Pattern,
+        block: usize,
+        rows: [f32x16<S>; EDGE],
+    ) -> bool {
+        let width = self.width as usize;
+        let x = self.at.0 as usize + block % SIDE_BLOCKS * EDGE;
+        let y = self.at.1 as usize + block / SIDE_BLOCKS * EDGE;
+        if pattern.samples > 1 || x + EDGE > width || (y + EDGE) * width > self.color.len() {
+            return false;
+        }
+        for (row, light) in rows.into_iter().enumerate() {
+            let from = (y + row) * width + x;
+            let sum = self.color[from..from + EDGE].as_flattened_mut();
+            (f32x16::from_slice(light.simd, sum) + light).store_slice(sum);
+        }
+        true
+    }
+
     /// Adds the light of a block's rays to their pixels, always in the same order.
     #[inline(always)]
     fn add<S: Simd>(&mut self, pattern: &Pattern, block: usize, light: [f32x16<S>; 4]) {
-        // Red, green, blue and cover of one ray after another.
-        let mut by_ray = [[0.0; 4]; LANES];
         let [red, green, blue, cover] = light;
         let (rb_low, rb_high) = red.interleave(blue);
         let (gc_low, gc_high) = green.interleave(cover);
-        let numbers: &mut [f32] = by_ray.as_flattened_mut();
+        // Red, green, blue and cover of one ray after another.
         let (first, second) = rb_low.interleave(gc_low);
         let (third, fourth) = rb_high.interleave(gc_high);
+        if self.rays.is_none() && self.add_whole(pattern, block, [first, second, third, fourth]) {
+            return;
+        }
+        let mut by_ray = [[0.0; 4]; LANES];
+        let numbers: &mut [f32] = by_ray.as_flattened_mut();
         first.store_slice(&mut numbers[..LANES]);
         second.store_slice(&mut numbers[LANES..2 * LANES]);
         third.store_slice(&mut numbers[2 * LANES..3 * LANES]);
         fourth.store_slice(&mut numbers[3 * LANES..]);
-
         if let Some(rays) = &mut self.rays {
             return Refine::add(rays, block, &by_ray);
         }
@@ -155,6 +179,9 @@ impl Canvas<'_> {
         }
     }
 }
+
+/// Edge of a block of one sample to a pixel.
+const EDGE: usize = 4;
 
 /// What reaches the hits of a tile, as parts of what would reach them in the open.
 #[derive(Debug)]
