@@ -12,7 +12,7 @@
 //! of its 8 × 8 parts (64 rays each), so that a rectangle is a 64-bit mask, and whether anything shows in
 //! it takes four comparisons. All bounds are conservative; the order decides only how much work there is.
 
-use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
+use fearless_simd::{f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use motes_grid::{Grid, Seen};
 
@@ -218,12 +218,14 @@ impl Easel<'_> {
         let seen = spheres.visible[group.class].block(grid, index);
         let particles = grid.particles_of(index);
         // Nothing of it shows behind the farthest ray of its parts.
-        let mut reach = 0f32;
-        let mut left = parts;
-        while left != 0 {
-            reach = reach.max(self.farthest[left.trailing_zeros() as usize]);
-            left &= left - 1;
+        let mut reach = f32x16::splat(simd, 0.0);
+        for quarter in 0..4 {
+            let at = quarter * LANES;
+            let farthest = f32x16::from_slice(simd, &self.farthest[at..at + LANES]);
+            let own = mask32x16::from_bitmask(simd, parts >> at & 0xffff);
+            reach = own.select(reach.max(farthest), reach);
         }
+        let reach = reach.reduce_max();
         let run = Run { grid, seen, block_first: particles.start, first_slot: group.first_slot };
         if self.tile.eye.is_some() {
             self.run::<S, true>(simd, run, (particles.start, particles.end), reach);
@@ -261,9 +263,9 @@ impl Easel<'_> {
             while may != 0 {
                 let lane = may.trailing_zeros() as usize;
                 may &= may - 1;
-                let [x0, x1, y0, y1] = frames.area(lane);
-                if x1 - x0 < 2 && y1 - y0 < 2 {
-                    due = self.enlist((frames.area(lane), frames.near[lane]), lane, due);
+                let area = frames.area[lane];
+                if area & LARGE == 0 {
+                    due = self.enlist((area, frames.near[lane]), lane, due);
                 } else {
                     let first_slot = run.first_slot + slot as u32;
                     self.draw::<S, PERSPECTIVE>(simd, (&frames, lane), first_slot);
@@ -282,16 +284,16 @@ impl Easel<'_> {
     /// `due` pairs of lane and block that are noted; gives how many there are then. No branches: what
     /// would be taken cannot be foreseen.
     #[inline(always)]
-    fn enlist(&mut self, ([x0, x1, y0, y1], near): (Area, f32), lane: usize, due: usize) -> usize {
-        let first = y0 * SIDE_BLOCKS + x0;
-        let (right, down) = (x1 - x0, y1 - y0);
+    fn enlist(&mut self, (area, near): (u32, f32), lane: usize, due: usize) -> usize {
+        let [x0, x1, y0, y1] = unpacked(area);
+        let lane = (lane << 8) as u16;
         let mut due = due;
-        for (dx, dy, there) in
-            [(0, 0, 1), (right, 0, right), (0, down, down), (right, down, right & down)]
+        for (x, y, there) in
+            [(x0, y0, true), (x1, y0, x1 > x0), (x0, y1, y1 > y0), (x1, y1, x1 > x0 && y1 > y0)]
         {
-            let block = (first + dy * SIDE_BLOCKS + dx) % (SIDE_BLOCKS * SIDE_BLOCKS);
-            self.due[due % MOST_DUE] = (lane << 8 | block) as u16;
-            due += there & usize::from(near < self.limit[block]);
+            let block = y * SIDE_BLOCKS + x;
+            self.due[due % MOST_DUE] = lane | block as u16;
+            due += usize::from(there & (near < self.limit[block]));
         }
         due
     }
@@ -365,10 +367,12 @@ impl Easel<'_> {
         cx.store_slice(&mut frames.center[0]);
         cy.store_slice(&mut frames.center[1]);
         cz.store_slice(&mut frames.center[2]);
-        i32x16::truncate_from(x0).store_slice(&mut frames.area[0]);
-        i32x16::truncate_from(x1).store_slice(&mut frames.area[1]);
-        i32x16::truncate_from(y0).store_slice(&mut frames.area[2]);
-        i32x16::truncate_from(y1).store_slice(&mut frames.area[3]);
+        let (x0, x1) = (u32x16::truncate_from(x0), u32x16::truncate_from(x1));
+        let (y0, y1) = (u32x16::truncate_from(y0), u32x16::truncate_from(y1));
+        let one = u32x16::splat(simd, 1);
+        let large = (x1 - x0).simd_gt(one) | (y1 - y0).simd_gt(one);
+        let large = large.select(u32x16::splat(simd, LARGE), u32x16::splat(simd, 0));
+        (x0 | x1 << 4 | y0 << 8 | y1 << 12 | large).store_slice(&mut frames.area);
         may
     }
 
@@ -380,7 +384,7 @@ impl Easel<'_> {
         (frames, lane): (&Frames, usize),
         first_slot: u32,
     ) {
-        let (area, near) = (frames.area(lane), frames.near[lane]);
+        let (area, near) = (unpacked(frames.area[lane]), frames.near[lane]);
         if !self.shows(simd, area, near) {
             return;
         }
@@ -461,7 +465,17 @@ struct Frames {
     center: [[f32; LANES]; 3],
     r2: [f32; LANES],
     near: [f32; LANES],
-    area: [[i32; LANES]; 4],
+    /// First and last block along x and y, four bits each, and whether it is [`LARGE`].
+    area: [u32; LANES],
+}
+
+/// Set in the area of a sphere that shows in more than two blocks along x or y.
+const LARGE: u32 = 1 << 16;
+
+#[inline(always)]
+fn unpacked(area: u32) -> Area {
+    let side = |shift: u32| (area >> shift & 15) as usize;
+    [side(0), side(4), side(8), side(12)]
 }
 
 impl Frames {
@@ -470,7 +484,7 @@ impl Frames {
             center: [[0.0; LANES]; 3],
             r2: [0.0; LANES],
             near: [0.0; LANES],
-            area: [[0; LANES]; 4],
+            area: [0; LANES],
         }
     }
 
@@ -483,18 +497,6 @@ impl Frames {
             f32x16::splat(simd, z[lane]),
         ];
         Drawn { center, r2: f32x16::splat(simd, self.r2[lane]) }
-    }
-
-    #[inline(always)]
-    fn area(&self, lane: usize) -> Area {
-        let [x0, x1, y0, y1] = &self.area;
-        // The bounds are within the tile; the masks only tell the compiler.
-        [
-            x0[lane] as usize & 15,
-            x1[lane] as usize & 15,
-            y0[lane] as usize & 15,
-            y1[lane] as usize & 15,
-        ]
     }
 }
 
