@@ -33,6 +33,10 @@ pub(crate) struct GroupView {
     /// Each block: its place in the lattice, its least distance (+∞ where nothing is seen of it) and its
     /// rectangle: least and greatest x, least and greatest y.
     pub block: [u32; GROUP],
+    /// Its particles, from the first to before the end; and whether only some of them are seen.
+    pub first: [u32; GROUP],
+    pub end: [u32; GROUP],
+    pub mixed: u64,
     pub near: [f32; GROUP],
     pub rect: [[f32; GROUP]; 4],
 }
@@ -96,6 +100,9 @@ fn view_of<S: Simd>(
             y: (f32::INFINITY, f32::NEG_INFINITY),
         },
         block: [0; GROUP],
+        first: [0; GROUP],
+        end: [0; GROUP],
+        mixed: 0,
         near: [f32::INFINITY; GROUP],
         rect: [[0.0; GROUP]; 4],
     };
@@ -103,11 +110,14 @@ fn view_of<S: Simd>(
     let mut boxes =
         Boxes { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3], radius: [0.0; LANES] };
     for index in group.blocks(&grid.lattice) {
-        if visible.block(grid, index) == Seen::Hidden {
-            continue;
+        match visible.block(grid, index) {
+            Seen::Hidden => continue,
+            Seen::Shown => {}
+            Seen::Mixed(_) => view.mixed |= 1 << count,
         }
         let block = &grid.blocks[index];
         view.block[count] = index as u32;
+        (view.first[count], view.end[count]) = (block.first, grid.blocks[index + 1].first);
         let lane = count % LANES;
         for axis in 0..3 {
             boxes.middle[axis][lane] = 0.5 * (block.low[axis] + block.high[axis]);

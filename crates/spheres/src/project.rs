@@ -19,11 +19,13 @@ use motes_grid::{Grid, Seen};
 use crate::intersect::{bits, meet, radii_at, sixteen_centers};
 use crate::overview::{Extent, GROUP, GroupView, Lens, slack};
 use crate::packet::{LANES, NO_SLOT};
-use crate::tile::{Place, RayTile, SIDE_BLOCKS};
+use crate::tile::{Pattern, Place, RayTile, SIDE_BLOCKS};
 use crate::traverse::{Counts, Spheres};
 
 /// Parts along a tile's side whose greatest distance is kept: two blocks each.
 const PARTS: usize = 8;
+/// Blocks of a tile.
+const TILE_BLOCKS: usize = SIDE_BLOCKS * SIDE_BLOCKS;
 /// Sixteen small spheres show in at most four blocks each; and one place more.
 const MOST_DUE: usize = 128;
 
@@ -37,13 +39,17 @@ pub(crate) fn project<S: Simd>(
     (groups, order): (&[GroupView], &[u32]),
     (rays, counts): (&motes_scene::Rays, &mut Counts),
 ) {
+    let (pattern, perspective) = (tile.pattern, tile.eye.is_some());
     let lenses: Vec<Lens> = spheres.classes.grids.iter().map(|g| Lens::new(rays, g)).collect();
+    let Some(sheet) = Sheet::of(tile) else { return };
     let mut easel = Easel {
-        tile,
+        sheet,
+        pattern,
+        perspective,
         spheres,
         lens: lenses[0],
         corner: (place.corner.0 as f32, place.corner.1 as f32),
-        limit: [f32::INFINITY; SIDE_BLOCKS * SIDE_BLOCKS],
+        limit: [f32::INFINITY; TILE_BLOCKS],
         farthest: [f32::INFINITY; PARTS * PARTS],
         farthest_of_all: f32::INFINITY,
         stale: u64::MAX,
@@ -70,16 +76,47 @@ pub(crate) fn project<S: Simd>(
 /// A rectangle of blocks of a tile: first and last along x and y.
 type Area = [usize; 4];
 
+/// The rays of a tile, block by block.
+struct Sheet<'a> {
+    direction: [&'a Blocks<f32>; 3],
+    origin: [&'a Blocks<f32>; 3],
+    distance: &'a mut Blocks<f32>,
+    slot: &'a mut Blocks<u32>,
+}
+
+/// A number of each ray of a tile.
+type Blocks<T> = [[T; LANES]; TILE_BLOCKS];
+
+impl<'a> Sheet<'a> {
+    /// `None` if the tile does not have as many rays as tiles have.
+    fn of(tile: &'a mut RayTile) -> Option<Self> {
+        let [dx, dy, dz] = &tile.direction;
+        let [ox, oy, oz] = &tile.origin;
+        Some(Self {
+            direction: [blocks(dx)?, blocks(dy)?, blocks(dz)?],
+            origin: [blocks(ox)?, blocks(oy)?, blocks(oz)?],
+            distance: tile.distance.as_chunks_mut().0.first_chunk_mut()?,
+            slot: tile.slot.as_chunks_mut().0.first_chunk_mut()?,
+        })
+    }
+}
+
+fn blocks(numbers: &[f32]) -> Option<&Blocks<f32>> {
+    numbers.as_chunks().0.first_chunk()
+}
+
 /// A tile on which a system is drawn.
 #[repr(align(64))]
 struct Easel<'a> {
-    tile: &'a mut RayTile,
+    sheet: Sheet<'a>,
+    pattern: Pattern,
+    perspective: bool,
     spheres: &'a Spheres<'a>,
     lens: Lens,
     /// The tile's first pixel.
     corner: (f32, f32),
     /// Greatest distance of the rays of each block.
-    limit: [f32; SIDE_BLOCKS * SIDE_BLOCKS],
+    limit: [f32; TILE_BLOCKS],
     /// Greatest distance of the rays of each part; never less than the truth.
     farthest: [f32; PARTS * PARTS],
     farthest_of_all: f32,
@@ -94,8 +131,8 @@ impl Easel<'_> {
     /// The blocks of the tile that have a ray in the rectangle, if any.
     #[inline(always)]
     fn area_of(&self, extent: Extent) -> Option<Area> {
-        let [x, y] = self.tile.pattern.inset;
-        let side = self.tile.pattern.side as f32;
+        let [x, y] = self.pattern.inset;
+        let side = self.pattern.side as f32;
         let most = side * SIDE_BLOCKS as f32 - 1.0;
         let (x0, x1) = whole_pixels(extent.x, self.corner.0, x);
         let (y0, y1) = whole_pixels(extent.y, self.corner.1, y);
@@ -137,7 +174,7 @@ impl Easel<'_> {
     #[inline(always)]
     fn measure<S: Simd>(&mut self, simd: S) {
         for (block, limit) in self.limit.iter_mut().enumerate() {
-            let rays = &self.tile.distance[block * LANES..(block + 1) * LANES];
+            let rays = &self.sheet.distance[block];
             *limit = f32x16::from_slice(simd, rays).reduce_max();
         }
     }
@@ -169,7 +206,7 @@ impl Easel<'_> {
     fn group<S: Simd>(&mut self, simd: S, group: &GroupView) {
         let mut order = [(0.0, 0u8); GROUP];
         let mut count = 0;
-        let side = self.tile.pattern.tile_side() as f32;
+        let side = self.pattern.tile_side() as f32;
         for first in (0..GROUP).step_by(LANES) {
             let lanes = first..first + LANES;
             let near = f32x16::from_slice(simd, &group.near[lanes.clone()]);
@@ -205,18 +242,21 @@ impl Easel<'_> {
             };
             let Some(area) = self.area_of(extent) else { continue };
             if self.shows(simd, area, *near) {
-                self.block(simd, group, (group.block[block] as usize, Self::parts(area)));
+                self.block(simd, (group, block), Self::parts(area));
             }
         }
     }
 
-    /// Draws a block that shows in some of `parts`.
+    /// Draws a block of a group that shows in some of `parts`.
     #[inline(always)]
-    fn block<S: Simd>(&mut self, simd: S, group: &GroupView, (index, parts): (usize, u64)) {
+    fn block<S: Simd>(&mut self, simd: S, (group, block): (&GroupView, usize), parts: u64) {
         let spheres = self.spheres;
         let grid = &spheres.classes.grids[group.class];
-        let seen = spheres.visible[group.class].block(grid, index);
-        let particles = grid.particles_of(index);
+        let (start, end) = (group.first[block] as usize, group.end[block] as usize);
+        let seen = match group.mixed >> block & 1 {
+            0 => Seen::Shown,
+            _ => spheres.visible[group.class].block(grid, group.block[block] as usize),
+        };
         // Nothing of it shows behind the farthest ray of its parts.
         let mut reach = f32x16::splat(simd, 0.0);
         for quarter in 0..4 {
@@ -226,11 +266,11 @@ impl Easel<'_> {
             reach = own.select(reach.max(farthest), reach);
         }
         let reach = reach.reduce_max();
-        let run = Run { grid, seen, block_first: particles.start, first_slot: group.first_slot };
-        if self.tile.eye.is_some() {
-            self.run::<S, true>(simd, run, (particles.start, particles.end), reach);
+        let run = Run { grid, seen, block_first: start, first_slot: group.first_slot };
+        if self.perspective {
+            self.run::<S, true>(simd, run, (start, end), reach);
         } else {
-            self.run::<S, false>(simd, run, (particles.start, particles.end), reach);
+            self.run::<S, false>(simd, run, (start, end), reach);
         }
     }
 
@@ -333,9 +373,9 @@ impl Easel<'_> {
             (z - radius, x * scale, y * scale, radius * scale, none)
         };
         let half = half + slack(rays);
-        let side = self.tile.pattern.side as f32;
+        let side = self.pattern.side as f32;
         let most = side * SIDE_BLOCKS as f32 - 1.0;
-        let [inset_x, inset_y] = self.tile.pattern.inset;
+        let [inset_x, inset_y] = self.pattern.inset;
         let at_x = rays.center[0] - self.corner.0;
         let at_y = rays.center[1] - self.corner.1;
         let x0 = (mx - half + (at_x - inset_x.1)).ceil();
@@ -410,35 +450,35 @@ impl Easel<'_> {
         (sphere, slot): (&Drawn<S>, u32),
         block: usize,
     ) {
-        let at = block * LANES;
-        let lanes = at..at + LANES;
+        let block = block % TILE_BLOCKS;
         let [mut ox, mut oy, mut oz] = sphere.center;
         if !PERSPECTIVE {
-            let [px, py, pz] = &self.tile.origin;
-            ox -= f32x16::from_slice(simd, &px[lanes.clone()]);
-            oy -= f32x16::from_slice(simd, &py[lanes.clone()]);
-            oz -= f32x16::from_slice(simd, &pz[lanes.clone()]);
+            let [px, py, pz] = &self.sheet.origin;
+            ox -= f32x16::from_slice(simd, &px[block]);
+            oy -= f32x16::from_slice(simd, &py[block]);
+            oz -= f32x16::from_slice(simd, &pz[block]);
         }
         self.counts.tests += LANES as u64;
-        let dx = f32x16::from_slice(simd, &self.tile.direction[0][lanes.clone()]);
-        let dy = f32x16::from_slice(simd, &self.tile.direction[1][lanes.clone()]);
-        let dz = f32x16::from_slice(simd, &self.tile.direction[2][lanes.clone()]);
+        let [dx, dy, dz] = &self.sheet.direction;
+        let dx = f32x16::from_slice(simd, &dx[block]);
+        let dy = f32x16::from_slice(simd, &dy[block]);
+        let dz = f32x16::from_slice(simd, &dz[block]);
         let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], sphere.r2);
-        let before = f32x16::from_slice(simd, &self.tile.distance[lanes.clone()]);
+        let before = f32x16::from_slice(simd, &self.sheet.distance[block]);
         let nearer = hit & distance.simd_lt(before);
         let ties = hit & distance.simd_eq(before);
         // Kept without asking whether there are any: the answer comes late, and cannot be foreseen.
         let nearest = nearer.select(distance, before);
-        nearest.store_slice(&mut self.tile.distance[lanes.clone()]);
-        let slots = u32x16::from_slice(simd, &self.tile.slot[lanes.clone()]);
+        nearest.store_slice(&mut self.sheet.distance[block]);
+        let slots = u32x16::from_slice(simd, &self.sheet.slot[block]);
         let slots = nearer.select(u32x16::splat(simd, slot), slots);
-        slots.store_slice(&mut self.tile.slot[lanes.clone()]);
+        slots.store_slice(&mut self.sheet.slot[block]);
         let limit = nearest.reduce_max();
         let part = block / SIDE_BLOCKS / 2 * PARTS + block % SIDE_BLOCKS / 2;
         self.stale |= u64::from(limit < self.limit[block]) << part;
         self.limit[block] = limit;
         if ties.any_true() {
-            break_ties(self.spheres, &mut self.tile.slot[lanes], (slot, ties.to_bitmask()));
+            break_ties(self.spheres, &mut self.sheet.slot[block], (slot, ties.to_bitmask()));
         }
     }
 }

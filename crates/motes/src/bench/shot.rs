@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_scene::{Lights, Primary, Rays};
 use motes_spheres::{Counts, Paint, Renderer, Settings, Sink, Spheres, Tile, View};
@@ -99,18 +100,50 @@ impl Sink for Studio {
     fn tile(&self, tile: &Tile<'_>) -> bool {
         let mut part = lock(&self.spare).pop().unwrap_or_default();
         (part.corner, part.width) = (tile.corner, tile.size.0);
-        part.pixels.clear();
-        part.pixels.extend(tile.color.iter().map(pack));
+        part.pixels.resize(tile.color.len(), 0);
+        dispatch!(Level::new(), simd => pack_all(simd, tile.color, &mut part.pixels));
         lock(&self.finished).push(part);
         true
     }
 }
 
+/// What is behind.
+const BEHIND: f32 = 32.0 / 255.0;
+/// In f32 beside this number, the last eight bits count ones.
+const WHOLE: f32 = 8_388_608.0;
+
+/// [`pack`] for as many colours, sixteen at a time.
+#[simd]
+fn pack_all<S: Simd>(simd: S, colors: &[[f32; 4]], packed: &mut [u32]) {
+    let (sixteens, rest) = colors.as_chunks::<16>();
+    let (packed, left) = packed.as_chunks_mut::<16>();
+    for (colors, packed) in sixteens.iter().zip(packed) {
+        let numbers = colors.as_flattened();
+        let first = f32x16::from_slice(simd, &numbers[..16]);
+        let third = f32x16::from_slice(simd, &numbers[32..48]);
+        let (rb0, ga0) = first.deinterleave(f32x16::from_slice(simd, &numbers[16..32]));
+        let (rb1, ga1) = third.deinterleave(f32x16::from_slice(simd, &numbers[48..]));
+        let (r, b) = rb0.deinterleave(rb1);
+        let (g, a) = ga0.deinterleave(ga1);
+        let behind = (f32x16::splat(simd, 1.0) - a) * BEHIND;
+        let (r, g, b) = (bytes(simd, r + behind), bytes(simd, g + behind), bytes(simd, b + behind));
+        let opaque = u32x16::splat(simd, 0xff00_0000);
+        (opaque | b << 16 | g << 8 | r).store_slice(packed);
+    }
+    for (color, packed) in rest.iter().zip(left) {
+        *packed = pack(color);
+    }
+}
+
+#[inline(always)]
+fn bytes<S: Simd>(simd: S, light: f32x16<S>) -> u32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let byte = light.max(zero).min(one) * 255.0 + WHOLE;
+    byte.bitcast::<u32x16<S>>() & u32x16::splat(simd, 0xff)
+}
+
 /// Linear, premultiplied RGBA before a dark background, as bytes: R in the lowest.
 pub(super) fn pack(color: &[f32; 4]) -> u32 {
-    const BEHIND: f32 = 32.0 / 255.0;
-    /// In f32 beside this number, the last eight bits count ones.
-    const WHOLE: f32 = 8_388_608.0;
     let behind = (1.0 - color[3]) * BEHIND;
     let [r, g, b, _] = color.map(|v| {
         let byte = 255.0 * (v + behind).clamp(0.0, 1.0);
@@ -128,5 +161,16 @@ mod tests {
         assert_eq!(pack(&[1.0, 0.5, 0.0, 1.0]), 0xff00_80ff);
         assert_eq!(pack(&[0.0; 4]), 0xff20_2020);
         assert_eq!(pack(&[9.0, -1.0, 0.25, 1.0]), 0xff40_00ff);
+    }
+
+    #[test]
+    fn many_colors_are_packed_as_one_is() {
+        let colors: Vec<[f32; 4]> = (0..37)
+            .map(|i| [0, 1, 2, 3].map(|c| (i * 4 + c) as f32 / 100.0 - 0.2))
+            .map(|[r, g, b, a]| [r, g, b, a.clamp(0.0, 1.0)])
+            .collect();
+        let mut packed = vec![0; colors.len()];
+        dispatch!(Level::new(), simd => pack_all(simd, &colors, &mut packed));
+        assert_eq!(packed, colors.iter().map(pack).collect::<Vec<_>>());
     }
 }
