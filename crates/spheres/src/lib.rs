@@ -15,6 +15,7 @@
 mod aims;
 mod beam;
 mod bounce;
+mod frames;
 mod frustum;
 mod hits;
 mod intersect;
