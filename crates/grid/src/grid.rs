@@ -92,6 +92,7 @@ impl Grid {
     }
 
     /// The particles of block `block`, as a range of the cell order.
+    #[inline]
     pub fn particles_of(&self, block: usize) -> std::ops::Range<usize> {
         self.blocks[block].first as usize..self.blocks[block + 1].first as usize
     }
@@ -102,16 +103,19 @@ impl Grid {
     }
 
     /// The centre of the particle at `slot` of the cell order.
+    #[inline]
     pub fn center(&self, slot: usize) -> Vec3 {
         Vec3::from_array(self.particles[slot].center)
     }
 
     /// The index, in the file's own order, of the particle at `slot` of the cell order.
+    #[inline]
     pub fn index(&self, slot: usize) -> u32 {
         self.particles[slot].index
     }
 
     /// The radius of the particle at `slot` of the cell order.
+    #[inline]
     pub fn radius_at(&self, slot: usize) -> f32 {
         match &self.radius {
             Radii::Uniform(r) => *r,

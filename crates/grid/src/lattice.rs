@@ -51,6 +51,7 @@ impl Lattice {
     }
 
     /// The position of a block in the list of blocks: x fastest.
+    #[inline]
     pub fn index(&self, block: [u32; 3]) -> usize {
         let [x, y, z] = block.map(|b| b as usize);
         let [nx, ny, _] = self.dims.map(|d| d as usize);

@@ -131,6 +131,7 @@ impl Frustum {
     }
 
     /// Whether spheres of radius `radius` with centres in the box can meet a ray.
+    #[inline]
     pub fn meets_box(&self, low: Vec3, high: Vec3, radius: f32) -> bool {
         let [k, u, v] = self.axes;
         let ks = (low[k], high[k]);
