@@ -5,7 +5,8 @@
 //!
 //! > a = (cx·cz ± r·√(cx² + cz² − r²)) / (cz² − r²)
 //!
-//! of which √(cx² + cz² − r²) ≤ |c| gives an upper bound that needs one root for both axes.
+//! of which √(cx² + cz² − r²) ≤ |c| gives an upper bound that needs one root for both axes. Of a sphere that
+//! the eye's plane cuts, a > (cx − r)/(cz + r) where cx > r, and likewise at the other side.
 
 use fearless_simd::{f32x16, prelude::*, u32x16};
 use motes_grid::Grid;
@@ -74,29 +75,42 @@ impl Window {
         let scale = f32x16::splat(simd, self.lens.scale);
         let zero = f32x16::splat(simd, 0.0);
         let ahead = (z + radius).simd_gt(zero);
-        let (near, mx, my, half, whole) = if PERSPECTIVE {
+        let margin = slack(rays);
+        // Least and greatest place along x and, upward, along y, from the middle of the picture.
+        let (near, [mut left, mut right, mut low, mut high]) = if PERSPECTIVE {
             let distance = z.mul_add(z, y.mul_add(y, x * x)).sqrt();
             let square = z.mul_add(z, -(radius * radius));
             let part = scale / square;
-            let (zp, half) = (z * part, radius * distance * part);
-            // The eye's plane cuts the sphere: it may be anywhere.
-            let cut = z.simd_le(radius * 1.001);
-            (distance - radius, x * zp, y * zp, half, cut)
+            let (zp, half) = (z * part, radius * distance * part + margin);
+            let (mx, my) = (x * zp, y * zp);
+            (distance - radius, [mx - half, mx + half, my - half, my + half])
         } else {
-            let none = zero.simd_gt(zero);
-            (z - radius, x * scale, y * scale, radius * scale, none)
+            let half = radius * scale + margin;
+            let (mx, my) = (x * scale, y * scale);
+            (z - radius, [mx - half, mx + half, my - half, my + half])
         };
-        let half = half + slack(rays);
+        // What the eye's plane cuts ends nowhere on one side.
+        let cut = z.simd_le(radius * 1.001);
+        if PERSPECTIVE && cut.any_true() {
+            let part = scale / (z + radius);
+            let none = f32x16::splat(simd, f32::INFINITY);
+            let (x0, x1) = (x - radius, x + radius);
+            let (y0, y1) = (y - radius, y + radius);
+            left = cut.select(x0.simd_gt(zero).select(x0 * part - margin, -none), left);
+            right = cut.select(x1.simd_lt(zero).select(x1 * part + margin, none), right);
+            low = cut.select(y0.simd_gt(zero).select(y0 * part - margin, -none), low);
+            high = cut.select(y1.simd_lt(zero).select(y1 * part + margin, none), high);
+        }
         let side = self.pattern.side as f32;
         let most = side * SIDE_BLOCKS as f32 - 1.0;
         let [inset_x, inset_y] = self.pattern.inset;
         let at_x = rays.center[0] - self.corner.0;
         let at_y = rays.center[1] - self.corner.1;
-        let x0 = (mx - half + (at_x - inset_x.1)).ceil();
-        let x1 = (mx + half + (at_x - inset_x.0)).floor();
+        let x0 = (left + (at_x - inset_x.1)).ceil();
+        let x1 = (right + (at_x - inset_x.0)).floor();
         // Rows run downward.
-        let y0 = (-my - half + (at_y - inset_y.1)).ceil();
-        let y1 = (-my + half + (at_y - inset_y.0)).floor();
+        let y0 = (-high + (at_y - inset_y.1)).ceil();
+        let y1 = (-low + (at_y - inset_y.0)).floor();
         let most = f32x16::splat(simd, most);
         let meets = x0.simd_le(x1)
             & y0.simd_le(y1)
@@ -104,16 +118,14 @@ impl Window {
             & y1.simd_ge(zero)
             & x0.simd_le(most)
             & y0.simd_le(most);
-        let shows = (meets | whole) & ahead & near.simd_lt(f32x16::splat(simd, reach));
+        let shows = meets & ahead & near.simd_lt(f32x16::splat(simd, reach));
         let may = shows.to_bitmask();
         if may == 0 {
             return 0;
         }
         let per_side = f32x16::splat(simd, 1.0 / side);
-        let x0 = whole.select(zero, x0.max(zero)) * per_side;
-        let x1 = whole.select(most, x1.min(most)) * per_side;
-        let y0 = whole.select(zero, y0.max(zero)) * per_side;
-        let y1 = whole.select(most, y1.min(most)) * per_side;
+        let (x0, x1) = (x0.max(zero) * per_side, x1.min(most) * per_side);
+        let (y0, y1) = (y0.max(zero) * per_side, y1.min(most) * per_side);
         let row = row * LANES..(row + 1) * LANES;
         near.store_slice(&mut frames.near[row.clone()]);
         (own_radius * own_radius).store_slice(&mut frames.r2[row.clone()]);

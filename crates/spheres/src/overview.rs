@@ -171,13 +171,14 @@ fn project_boxes<S: Simd>(
         let ay = (my.abs() - hy).max(zero);
         let az = (mz.abs() - hz).max(zero);
         let near = az.mul_add(az, ay.mul_add(ay, ax * ax)).sqrt() - radius;
-        // In front of the eye throughout, or of any slope.
+        // What the eye's plane cuts ends nowhere on one side.
         let front = z0.simd_gt(zero);
-        let (inv0, inv1) = (f32x16::splat(simd, 1.0) / z0, f32x16::splat(simd, 1.0) / z1);
-        let least_x = front.select(x0 * x0.simd_gt(zero).select(inv1, inv0), -infinity);
-        let most_x = front.select(x1 * x1.simd_gt(zero).select(inv0, inv1), infinity);
-        let least_y = front.select(y0 * y0.simd_gt(zero).select(inv1, inv0), -infinity);
-        let most_y = front.select(y1 * y1.simd_gt(zero).select(inv0, inv1), infinity);
+        let inv1 = f32x16::splat(simd, 1.0) / z1;
+        let inv0 = front.select(f32x16::splat(simd, 1.0) / z0, infinity);
+        let least_x = least(simd, x0, (inv0, inv1));
+        let most_x = -least(simd, -x1, (inv0, inv1));
+        let least_y = least(simd, y0, (inv0, inv1));
+        let most_y = -least(simd, -y1, (inv0, inv1));
         (near, [least_x, most_x, least_y, most_y])
     } else {
         (z0, [x0, x1, y0, y1])
@@ -192,6 +193,17 @@ fn project_boxes<S: Simd>(
     (-most_y * scale + (rays.center[1] - low)).store_slice(&mut view.rect[2][lanes.clone()]);
     (-least_y * scale + (rays.center[1] + low)).store_slice(&mut view.rect[3][lanes.clone()]);
     ahead.select(near, infinity).store_slice(&mut view.near[lanes]);
+}
+
+/// The least x/z of z between `1/inv0` and `1/inv1`, the nearer and the farther: −∞ where the nearer is zero and
+/// x not positive.
+#[inline(always)]
+fn least<S: Simd>(simd: S, x: f32x16<S>, (inv0, inv1): (f32x16<S>, f32x16<S>)) -> f32x16<S> {
+    let zero = f32x16::splat(simd, 0.0);
+    let aside = x.simd_lt(zero).select(x * inv0, x * inv1);
+    // Zero times infinity.
+    let none = x.simd_eq(zero) & inv0.simd_eq(f32x16::splat(simd, f32::INFINITY));
+    none.select(f32x16::splat(simd, f32::NEG_INFINITY), aside)
 }
 
 /// What rounding may add to a place in the picture, pixels.

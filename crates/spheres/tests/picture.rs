@@ -77,6 +77,28 @@ fn heap() -> Vec<([f32; 3], f32)> {
         .collect()
 }
 
+/// What the eye's plane cuts is not before the eye, but where it is near.
+#[test]
+fn spheres_beside_the_eye_are_not_drawn() {
+    let beside: Vec<([f32; 3], f32)> = (0..64u32)
+        .map(|i| std::f32::consts::TAU * i as f32 / 64.0)
+        .map(|around| ([3.0 * around.cos(), 3.0 * around.sin(), 10.0 - 0.04], 0.1))
+        .collect();
+    let lights = lights(|_| {});
+    let seen = picture(&beside, &lights, &rays(Projection::Perspective), settings(1));
+    assert_eq!(seen.counts.tests, 0);
+    assert!(seen.center.iter().all(|center| center.id < 0));
+
+    // One that the plane cuts, too, but that reaches into the view.
+    let mut near = beside;
+    near.push(([0.3, 0.0, 9.98], 0.29));
+    let rays = rays(Projection::Perspective);
+    let seen = picture(&near, &lights, &rays, settings(1));
+    let traced = Settings { primary: Primary::Trace, ..settings(1) };
+    assert!(seen.center.iter().any(|center| center.id == 64));
+    assert_eq!(seen.center, picture(&near, &lights, &rays, traced).center);
+}
+
 fn center_of(picture: &Picture) -> [f32; 4] {
     picture.color[(SIZE.1 / 2 * SIZE.0 + SIZE.0 / 2) as usize]
 }
