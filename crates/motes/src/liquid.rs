@@ -163,6 +163,7 @@ impl Liquid<'_> {
         let occlusion = (lights.occlusion_rays > 0 && optics.mode != Mode::Refractive)
             .then(|| Occlusion::new(4 * lights.occlusion_rays, self.occlusion_radius(lights)));
         let around = Around {
+            level: self.level,
             lights,
             beyond: environment,
             shown: self.scene.surface.environment != "none" && !self.scene.image.transparent,

@@ -28,6 +28,7 @@ mod elements;
 mod environment;
 mod error;
 mod light;
+mod look;
 mod motion;
 pub mod optics;
 mod resolve;

@@ -77,7 +77,7 @@ fn a_ball_is_a_lens() {
             skip: true,
         };
         let lights = lights();
-        let around = Around {
+        let around = Around { level: fearless_simd::Level::new(),
             lights: &lights,
             beyond: &Hues,
             shown: true,
