@@ -83,9 +83,7 @@ fn floor_axes(floor: &Floor) -> [Vec3; 2] {
 #[inline(always)]
 fn dot<S: Simd>(simd: S, a: Vec3x16<S>, b: Vec3) -> f32x16<S> {
     let [x, y, z] = [b.x, b.y, b.z];
-    a[0] * f32x16::splat(simd, x)
-        + a[1] * f32x16::splat(simd, y)
-        + a[2] * f32x16::splat(simd, z)
+    a[0] * f32x16::splat(simd, x) + a[1] * f32x16::splat(simd, y) + a[2] * f32x16::splat(simd, z)
 }
 
 #[inline(always)]
@@ -135,11 +133,7 @@ fn with_floor<S: Simd>(
 
 /// The light of the floor's tiles, averaged over squares of edge `wide`.
 #[inline(always)]
-fn tiles<S: Simd>(
-    simd: S,
-    floor: &Floor,
-    (at, wide): ([f32x16<S>; 2], f32x16<S>),
-) -> Vec3x16<S> {
+fn tiles<S: Simd>(simd: S, floor: &Floor, (at, wide): ([f32x16<S>; 2], f32x16<S>)) -> Vec3x16<S> {
     let [half, one] = [f32x16::splat(simd, 0.5), f32x16::splat(simd, 1.0)];
     let per_tile = f32x16::splat(simd, 1.0 / floor.tile);
     let wide = (wide * per_tile).max(f32x16::splat(simd, 1e-3));
@@ -207,8 +201,7 @@ fn mixed<S: Simd>(simd: S, [from, to]: [Vec3; 2], part: f32x16<S>) -> Vec3x16<S>
     let mut light = [part; 3];
     for (i, light) in light.iter_mut().enumerate() {
         let (from, to) = (from[i], to[i]);
-        *light =
-            part.mul_add_precise(f32x16::splat(simd, to - from), f32x16::splat(simd, from));
+        *light = part.mul_add_precise(f32x16::splat(simd, to - from), f32x16::splat(simd, from));
     }
     light
 }
@@ -233,8 +226,7 @@ fn day<S: Simd>(simd: S, direction: Vec3x16<S>, (up, sun): (Vec3, Vec3)) -> Vec3
     let x1024 = x256 * x256 * x256 * x256;
     // 1500 = 1024 + 256 + 128 + 64 + 24 + 4.
     let x1500 = x1024 * x256 * (x64 * x64) * x64 * x24 * x4;
-    let shine =
-        x1500.mul_add_precise(f32x16::splat(simd, 12.0), x24 * f32x16::splat(simd, 0.5));
+    let shine = x1500.mul_add_precise(f32x16::splat(simd, 12.0), x24 * f32x16::splat(simd, 0.5));
     let mut light = above;
     for (i, light) in light.iter_mut().enumerate() {
         let base = is_above.select(*light, below[i]);
@@ -247,7 +239,7 @@ fn day<S: Simd>(simd: S, direction: Vec3x16<S>, (up, sun): (Vec3, Vec3)) -> Vec3
 ///
 /// > e^x = 2ⁿ·e^r with n = round(x·log₂e) and |r| ≤ ½·ln 2, where the series up to r⁶ serves.
 #[inline(always)]
-pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+pub fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let least = f32x16::splat(simd, -87.0);
     let some = x.simd_ge(least);
     let x = x.max(least);
@@ -296,7 +288,13 @@ mod tests {
         let skies = [
             Sky::Gradient { up: Vec3::Z, top: Vec3::ONE, bottom: Vec3::X },
             Sky::Day { up: Vec3::Z, sun },
-            Sky::Image(Equirectangular { width: 8, height: 4, pixels, up: Vec3::Z, ahead: Vec3::X }),
+            Sky::Image(Equirectangular {
+                width: 8,
+                height: 4,
+                pixels,
+                up: Vec3::Z,
+                ahead: Vec3::X,
+            }),
         ];
         let floor = Floor {
             point: Vec3::new(0.1, 0.2, -1.0),

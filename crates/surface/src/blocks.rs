@@ -6,6 +6,7 @@
 //! the longest one inside, and the longest one outside between. A ray that stays in one of them meets nothing
 //! in the block; and what four by four blocks have in common is had from what each has.
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::Surfaces;
@@ -84,9 +85,9 @@ impl Block {
     }
 }
 
-/// The blocks of one level.
+/// The blocks of one size.
 #[derive(Clone, Debug, Default)]
-struct Level {
+struct Size {
     blocks: Vec<Block>,
     across: usize,
     down: usize,
@@ -96,12 +97,14 @@ struct Level {
 #[derive(Clone, Debug)]
 pub struct Blocks {
     /// Those of level 1 first.
-    levels: Vec<Level>,
+    levels: Vec<Size>,
+    /// What rays go through them with.
+    pub(crate) level: Level,
 }
 
 impl Blocks {
     /// The blocks of all columns.
-    pub fn new(surfaces: &Surfaces) -> Self {
+    pub fn new(level: Level, surfaces: &Surfaces) -> Self {
         let [width, height] = [surfaces.view.size.0 as usize, surfaces.view.size.1 as usize];
         let [across, down] = [width.div_ceil(EDGE), height.div_ceil(EDGE)];
         let mut blocks = vec![Block::NOTHING; across * down];
@@ -114,12 +117,12 @@ impl Blocks {
                 *block = of_columns(surfaces, rows, common);
             }
         });
-        let mut levels = vec![Level { blocks, across, down }];
+        let mut levels = vec![Size { blocks, across, down }];
         while levels.len() < LEVELS as usize {
             let above = levels[levels.len() - 1].grouped();
             levels.push(above);
         }
-        Self { levels }
+        Self { levels, level }
     }
 
     /// Whether a ray inside the liquid or not meets nothing in the block of the level that a pixel is in,
@@ -183,7 +186,8 @@ fn of_columns(
     common.push(Stretch { low: f32::NEG_INFINITY, high: f32::INFINITY });
     for column in columns {
         let ends = |i: usize| column.get(i).copied().unwrap_or(f32::NEG_INFINITY);
-        let gaps = (1..column.len()).step_by(2).map(|i| Stretch { low: ends(i + 1), high: ends(i) });
+        let gaps =
+            (1..column.len()).step_by(2).map(|i| Stretch { low: ends(i + 1), high: ends(i) });
         let first = Stretch { low: ends(0), high: f32::INFINITY };
         keep(common, std::iter::once(first).chain(gaps));
     }
@@ -202,7 +206,7 @@ fn keep(common: &mut Vec<Stretch>, stretches: impl Iterator<Item = Stretch> + Cl
     common.drain(..before);
 }
 
-impl Level {
+impl Size {
     /// The blocks of [`EDGE`]² of these.
     fn grouped(&self) -> Self {
         let [across, down] = [self.across.div_ceil(EDGE), self.down.div_ceil(EDGE)];
@@ -230,7 +234,8 @@ fn in_common<'a>(parts: impl Iterator<Item = &'a Block> + Clone) -> Block {
     if block.between.is_some() {
         for part in parts {
             let one = block.between;
-            block.between = part.outside().iter().fold(Stretch::NONE, |s, o| s.longer(one.both(*o)));
+            block.between =
+                part.outside().iter().fold(Stretch::NONE, |s, o| s.longer(one.both(*o)));
         }
     }
     block

@@ -38,6 +38,7 @@ mod spans;
 mod splat;
 mod surfaces;
 mod tile;
+mod translucent;
 mod view;
 mod voxelize;
 

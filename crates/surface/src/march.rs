@@ -9,6 +9,8 @@
 //! Columns are steps where the surface is smooth. A ray that leaves a surface, or goes along it, would hit
 //! the next step; so what is met must be met from the right side of its normal, or it is passed over.
 
+use fearless_simd::{Simd, dispatch};
+use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_scene::Projection;
 
@@ -136,7 +138,7 @@ impl Axis {
 
 impl Line {
     /// The part of `ray` between the near and the far plane.
-    #[inline]
+    #[inline(always)]
     fn new(surfaces: &Surfaces, ray: &Ray) -> Option<Self> {
         let view = &surfaces.view;
         let rays = &view.rays;
@@ -155,9 +157,7 @@ impl Line {
                 let q = 1.0 / v.z;
                 Vec3::new(rays.center[0] + v.x * q, rays.center[1] + v.y * q, q)
             }
-            Projection::Orthographic => {
-                Vec3::new(rays.center[0] + v.x, rays.center[1] + v.y, -v.z)
-            }
+            Projection::Orthographic => Vec3::new(rays.center[0] + v.x, rays.center[1] + v.y, -v.z),
         };
         if reach.is_nan() || reach <= 0.0 {
             return None;
@@ -184,9 +184,21 @@ pub fn march(surfaces: &Surfaces, ray: &Ray) -> (Option<Hit>, u32) {
 
 /// As [`march`], with the same result, over the columns that cannot be skipped.
 pub fn march_blocks((surfaces, blocks): (&Surfaces, &Blocks), ray: &Ray) -> (Option<Hit>, u32) {
+    dispatch!(blocks.level, simd => march_with(simd, (surfaces, blocks), ray))
+}
+
+/// One ray needs no vectors, but is faster with the instructions that come with them.
+#[simd]
+fn march_with<S: Simd>(
+    simd: S,
+    (surfaces, blocks): (&Surfaces, &Blocks),
+    ray: &Ray,
+) -> (Option<Hit>, u32) {
+    let _ = simd;
     march_over((surfaces, Some(blocks)), ray)
 }
 
+#[inline(always)]
 fn march_over(of: (&Surfaces, Option<&Blocks>), ray: &Ray) -> (Option<Hit>, u32) {
     match Line::new(of.0, ray) {
         Some(line) if ray.inside => walk::<true>(of, ray, line),
@@ -195,6 +207,7 @@ fn march_over(of: (&Surfaces, Option<&Blocks>), ray: &Ray) -> (Option<Hit>, u32)
     }
 }
 
+#[inline(always)]
 fn walk<const INSIDE: bool>(
     (surfaces, blocks): (&Surfaces, Option<&Blocks>),
     ray: &Ray,

@@ -29,6 +29,8 @@ pub(crate) struct Paths<'a> {
     pub work: Work,
     /// What is looked up together.
     pub later: Later,
+    /// Pixels of translucent liquid that are worked out together.
+    pub waiting: Vec<Pixel>,
 }
 
 impl<'a> Paths<'a> {
@@ -37,7 +39,15 @@ impl<'a> Paths<'a> {
         (optics, around): (&'a Optics, &'a Around<'a>),
         blocks: Option<&'a Blocks>,
     ) -> Self {
-        Self { surfaces, optics, around, blocks, work: Work::default(), later: Later::default() }
+        Self {
+            surfaces,
+            optics,
+            around,
+            blocks,
+            work: Work::default(),
+            later: Later::default(),
+            waiting: Vec::new(),
+        }
     }
 
     /// Follows the light of a pixel whose column holds a surface; gives what is not looked up later.

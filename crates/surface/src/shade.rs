@@ -8,7 +8,7 @@ use std::ops::Add;
 
 use fearless_simd::Level;
 use glam::{Vec3, Vec4};
-use motes_scene::{Beyond, Lights, Sight, optics};
+use motes_scene::{Beyond, Lights, Sight};
 use rayon::prelude::*;
 
 use crate::occlusion::Occlusion;
@@ -92,7 +92,7 @@ pub(crate) struct Later {
 }
 
 /// Rays that are looked up at once.
-const TOGETHER: usize = 1 << 11;
+const TOGETHER: usize = 1 << 8;
 
 impl Later {
     /// The light that a ray meets outside, `part` of it, goes to pixel number `to` of the row.
@@ -153,7 +153,8 @@ pub fn shade_finer(
     let finer = finer.max(1) as usize;
     let [width, height] =
         [surfaces.view.size.0 as usize / finer, surfaces.view.size.1 as usize / finer];
-    let blocks = (optics.mode == Mode::Refractive && optics.skip).then(|| Blocks::new(surfaces));
+    let blocks = (optics.mode == Mode::Refractive && optics.skip)
+        .then(|| Blocks::new(around.level, surfaces));
     let paths = || Paths::new(surfaces, (optics, around), blocks.as_ref());
     let all = |color: &mut [[f32; 4]], each: &Each<'_>| {
         let bands = color.par_chunks_mut((SQUARE * width).max(1)).enumerate().map(|(y, band)| {
@@ -199,10 +200,7 @@ type Each<'a> = dyn Fn([usize; 2], &mut Paths<'_>, &mut [[f32; 4]]) + Sync + 'a;
 const SQUARE: usize = 32;
 
 /// The pixels of a picture from row `first` on, in squares side by side.
-fn in_squares(
-    [width, height]: [usize; 2],
-    first: usize,
-) -> impl Iterator<Item = (usize, usize)> {
+fn in_squares([width, height]: [usize; 2], first: usize) -> impl Iterator<Item = (usize, usize)> {
     let rows = first..(first + SQUARE).min(height);
     (0..width).step_by(SQUARE).flat_map(move |left| {
         let columns = left..(left + SQUARE).min(width);
@@ -221,19 +219,27 @@ impl Paths<'_> {
         let pixel = Pixel { index, place, origin, direction, spread, to: to as u32, share };
         let light = match (surfaces.of(index).is_empty(), self.optics.mode) {
             (true, _) => self.nothing(&pixel),
+            (_, Mode::Translucent) => {
+                self.waiting.push(pixel);
+                Vec4::ZERO
+            }
             (_, Mode::Front) => front(surfaces, &pixel, self.around),
-            (_, Mode::Translucent) => self.translucent(&pixel),
             (_, Mode::Refractive) => self.pixel(&pixel),
         };
         row[to] = (Vec4::from_array(row[to]) + light * share).to_array();
-        if self.later.sights.len() >= TOGETHER {
-            self.later.settle(self.around, row);
+        if self.waiting.len() + self.later.sights.len() >= TOGETHER {
+            self.settle(row);
         }
+    }
+
+    fn settle(&mut self, row: &mut [[f32; 4]]) {
+        self.translucent(row);
+        self.later.settle(self.around, row);
     }
 
     /// Adds to a row what is still to be looked up.
     fn finish(&mut self, row: &mut [[f32; 4]]) -> Work {
-        self.later.settle(self.around, row);
+        self.settle(row);
         self.work
     }
 }
@@ -279,65 +285,30 @@ impl Paths<'_> {
         self.look(pixel, pixel.sight(), Vec3::ONE);
         Vec4::W
     }
-
-    fn translucent(&mut self, pixel: &Pixel) -> Vec4 {
-        let Self { surfaces, optics, around, .. } = *self;
-        let of = surfaces.of(pixel.index);
-        let per_depth = 1.0 / pixel.direction.dot(surfaces.view.rays.forward);
-        let (mut light, mut left) = (Vec3::ZERO, Vec3::ONE);
-        let first = of.start;
-        let extinction = optics.absorption + optics.scattering;
-        let albedo = optics.scattering / extinction.max(Vec3::splat(f32::MIN_POSITIVE));
-        for entry in of.clone().step_by(2) {
-            let mut length = surfaces.depth(entry + 1) - surfaces.depth(entry);
-            if entry + 2 == of.end {
-                length -= surfaces.empty(pixel.index);
-            }
-            let through = optics::transmitted(extinction, length.max(0.0) * per_depth);
-            let color = around.color_of(surfaces, entry);
-            let scattered = albedo * color * lit(surfaces, (pixel, entry), around);
-            light += left * (Vec3::ONE - through) * scattered;
-            left *= through;
-        }
-        // What the first surface mirrors; an eye inside sees no mirror.
-        let mut thrown = 0.0;
-        if surfaces.depth(first) > surfaces.view.near {
-            let split = optics::split(pixel.direction, surfaces.normal(first), 1.0 / optics.ior);
-            let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
-            let origin = surfaces.view.point([x, y], surfaces.nearness[first]);
-            thrown = split.reflectance;
-            let sight = Sight { origin, direction: split.reflected, ..pixel.sight() };
-            self.look(pixel, sight, Vec3::splat(thrown));
-        }
-        let through = left * (1.0 - thrown);
-        let alpha = match around.shown {
-            true => {
-                self.look(pixel, pixel.sight(), through);
-                1.0
-            }
-            false => 1.0 - through.element_sum() / 3.0,
-        };
-        (light * (1.0 - thrown)).extend(alpha)
-    }
 }
 
-/// The light of a surface of colour `color`, as if it were opaque.
-fn lit(surfaces: &Surfaces, (pixel, surface): (&Pixel, usize), around: &Around<'_>) -> Vec3 {
-    let (normal, lights) = (surfaces.normal(surface), around.lights);
+/// The part of the key light that falls onto a surface.
+pub(crate) fn key_on(
+    surfaces: &Surfaces,
+    (pixel, surface): (&Pixel, usize),
+    around: &Around<'_>,
+) -> f32 {
+    let normal = surfaces.normal(surface);
     let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
     let point = surfaces.view.point([x, y], surfaces.nearness[surface]);
-    let key = lights.key.seen_from(point);
-    let cos = normal.dot(key.direction).max(0.0);
-    let reached = match around.shadow {
-        Some(shadow) if cos > 0.0 => shadow.reached(point, normal),
-        _ => 1.0,
-    };
-    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, surface)));
-    lights.key.color * (cos * reached) + lights.fill(normal) * open + lights.ambient
+    let cos = normal.dot(around.lights.key.seen_from(point).direction).max(0.0);
+    match around.shadow {
+        Some(shadow) if cos > 0.0 => cos * shadow.reached(point, normal),
+        _ => cos,
+    }
 }
 
 fn front(surfaces: &Surfaces, pixel: &Pixel, around: &Around<'_>) -> Vec4 {
     let first = surfaces.of(pixel.index).start;
     let color = around.color_of(surfaces, first);
-    (color * lit(surfaces, (pixel, first), around)).extend(1.0)
+    let lights = around.lights;
+    let key = key_on(surfaces, (pixel, first), around);
+    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, first)));
+    let fill = lights.fill(surfaces.normal(first)) * open;
+    (color * (lights.key.color * key + fill + lights.ambient)).extend(1.0)
 }
