@@ -20,6 +20,11 @@ pub trait Beyond: Sync {
         self.meet(sight).map(|(_, distance)| distance).filter(|d| d.is_finite())
     }
 
+    /// Whether something may stand before the medium or in it.
+    fn is_amid(&self) -> bool {
+        false
+    }
+
     /// Appends to `seen` what each of `sights` meets, as if its reach were infinite: in each entry light and
     /// distance, which is infinite where there is nothing.
     fn look(&self, level: Level, sights: &[Sight], seen: &mut Vec<(Vec3, f32)>) {

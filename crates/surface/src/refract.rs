@@ -56,10 +56,9 @@ impl<'a> Paths<'a> {
         let first = surfaces.of(pixel.index).start;
         let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
         let point = surfaces.view.point([x, y], surfaces.nearness[first]);
-        let to_eye = point.distance(pixel.origin);
-        let before = Sight { reach: to_eye, ..pixel.sight() };
-        if self.around.beyond.distance(&before).is_some() {
-            // What stands before the liquid.
+        let before = Sight { reach: point.distance(pixel.origin), ..pixel.sight() };
+        if !self.around.beyond.is_amid() && self.around.beyond.distance(&before).is_some() {
+            // The floor.
             self.look(pixel, before, Vec3::ONE);
             return Vec4::W;
         }

@@ -216,9 +216,20 @@ impl Paths<'_> {
         let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
         let spread = surfaces.view.rays.pixel;
         let index = y * surfaces.view.size.0 as usize + x;
-        let pixel = Pixel { index, place, origin, direction, spread, to: to as u32, share };
+        let stop = f32::INFINITY;
+        let mut pixel =
+            Pixel { index, place, origin, direction, spread, stop, to: to as u32, share };
+        if self.around.beyond.is_amid() {
+            let met = self.around.beyond.distance(&pixel.sight());
+            pixel.stop = met.unwrap_or(stop) * direction.dot(surfaces.view.rays.forward);
+        }
         let light = match (surfaces.of(index).is_empty(), self.optics.mode) {
             (true, _) => self.nothing(&pixel),
+            // What stands before the liquid.
+            _ if pixel.stop <= surfaces.depth(surfaces.of(index).start) => {
+                self.look(&pixel, pixel.sight(), Vec3::ONE);
+                Vec4::W
+            }
             (_, Mode::Translucent) => {
                 self.waiting.push(pixel);
                 Vec4::ZERO
@@ -258,6 +269,8 @@ pub(crate) struct Pixel {
     pub direction: Vec3,
     /// Size of a pixel: at distance 1 in perspective, which serves for orthographic projection, too.
     pub spread: f32,
+    /// Depth of what stands before the liquid or in it.
+    pub stop: f32,
     /// Where in its row its light goes, and what share of it.
     pub to: u32,
     pub share: f32,
@@ -278,8 +291,8 @@ impl Paths<'_> {
     }
 
     fn nothing(&mut self, pixel: &Pixel) -> Vec4 {
-        if !self.around.shown {
-            // The floor and other things are not the background.
+        if !self.around.shown && pixel.stop == f32::INFINITY {
+            // The floor is not the background.
             return Vec4::ZERO;
         }
         self.look(pixel, pixel.sight(), Vec3::ONE);

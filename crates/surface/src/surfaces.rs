@@ -131,6 +131,15 @@ impl Surfaces {
 }
 
 impl View {
+    /// The nearness of a depth.
+    #[inline]
+    pub fn nearness(&self, depth: f32) -> f32 {
+        match self.rays.projection {
+            Projection::Perspective => 1.0 / depth,
+            Projection::Orthographic => -depth,
+        }
+    }
+
     /// The point at a place of the picture and a nearness.
     #[inline]
     pub fn point(&self, [x, y]: [f32; 2], nearness: f32) -> Vec3 {

@@ -69,12 +69,12 @@ impl Paths<'_> {
             self.look(pixel, sight, Vec3::splat(thrown));
         }
         let through = of(&seen.left) * (1.0 - thrown);
-        let alpha = match self.around.shown {
+        let alpha = match self.around.shown || pixel.stop < f32::INFINITY {
             true => {
                 self.look(pixel, pixel.sight(), through);
                 1.0
             }
-            // The floor and other things are not the background.
+            // The floor is not the background.
             false => 1.0 - through.element_sum() / 3.0,
         };
         let light = (of(&seen.light) * (1.0 - thrown)).extend(alpha) * pixel.share;
@@ -101,8 +101,9 @@ impl Paths<'_> {
             if entry >= of.end {
                 continue;
             }
-            slot.ends[0][lane] = surfaces.nearness[entry];
-            slot.ends[1][lane] = surfaces.nearness[entry + 1];
+            let stop = surfaces.view.nearness(pixel.stop);
+            let ends = [0, 1].map(|i| surfaces.nearness[entry + i].max(stop));
+            (slot.ends[0][lane], slot.ends[1][lane]) = (ends[0], ends[1]);
             slot.normal[lane] = surfaces.normals[entry];
             if entry + 2 == of.end {
                 slot.empty[lane] = surfaces.empty(pixel.index);
