@@ -10,6 +10,10 @@
 //! list, [`PRECEDING`] or [`FOLLOWING`] in the own one. Beyond the edge of the picture a surface goes on as it is: it is
 //! linked to itself.
 
+use std::ops::Range;
+
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
 use crate::Spans;
@@ -53,26 +57,129 @@ impl Side {
 }
 
 /// The links of every surface of `spans`, parallel to its depths. Columns hold at most [`MOST_SPANS`] spans.
-pub fn connect(spans: &Spans) -> Vec<Links> {
-    let size = [spans.size.0 as usize, spans.size.1 as usize];
+pub fn connect(spans: &Spans, level: Level) -> Vec<Links> {
     let mut links = vec![Links::default(); spans.depths.len()];
     rows_mut(&mut links, spans).into_par_iter().enumerate().for_each(|(y, row)| {
-        let first = 2 * spans.starts[y * size[0]] as usize;
-        for x in 0..size[0] {
-            let own = column(spans, y * size[0] + x);
-            let from = 2 * spans.starts[y * size[0] + x] as usize - first;
-            let links = &mut row[from..from + own.len()];
-            for side in Side::ALL {
-                match side.neighbor([x, y], size) {
-                    Some([nx, ny]) => {
-                        connect_columns(own, column(spans, ny * size[0] + nx), (links, side));
-                    }
-                    None => itself(links, side),
-                }
-            }
-        }
+        dispatch!(level, simd => connect_row(simd, spans, y, row));
     });
     links
+}
+
+/// Those of a row of columns.
+#[simd]
+fn connect_row<S: Simd>(simd: S, spans: &Spans, y: usize, mut row: &mut [Links]) {
+    let [width, height] = [spans.size.0 as usize, spans.size.1 as usize];
+    for x in 0..width {
+        let pixel = y * width + x;
+        let own = column(spans, pixel);
+        let (links, rest) = std::mem::take(&mut row).split_at_mut(own.len());
+        row = rest;
+        if own.is_empty() {
+            continue;
+        }
+        let inside = x > 0 && x + 1 < width && y > 0 && y + 1 < height;
+        // In the order of sides.
+        let around = if inside {
+            [pixel - 1, pixel + 1, pixel - width, pixel + width].map(|p| spans.of(p))
+        } else {
+            Default::default()
+        };
+        if inside && around.iter().all(|of| fits(spans, of)) {
+            let [left, right, up, down] = around;
+            let near = [
+                Near::of(simd, spans, left),
+                Near::of(simd, spans, right),
+                Near::of(simd, spans, up),
+                Near::of(simd, spans, down),
+            ];
+            connect_quickly(simd, own, &near, links);
+        } else {
+            connect_plainly(spans, [x, y], links);
+        }
+    }
+}
+
+/// Surfaces of a column that are looked at together.
+const LANES: usize = 16;
+
+/// Whether a column's surfaces are so few, and enough values behind them for all lanes.
+#[inline]
+fn fits(spans: &Spans, of: &Range<usize>) -> bool {
+    2 * of.len() <= LANES && 2 * of.start + LANES <= spans.depths.len()
+}
+
+/// A neighbouring column of few spans, entries and exits in turns.
+struct Near<S: Simd> {
+    depths: f32x16<S>,
+    /// The lanes that are entries, and exits.
+    entries: u64,
+    exits: u64,
+}
+
+impl<S: Simd> Near<S> {
+    #[inline(always)]
+    fn of(simd: S, spans: &Spans, of: Range<usize>) -> Self {
+        let all = (1 << (2 * of.len())) - 1;
+        let depths = &spans.depths[2 * of.start..2 * of.start + LANES];
+        Self {
+            depths: f32x16::from_slice(simd, depths),
+            entries: all & 0x5555,
+            exits: all & 0xaaaa,
+        }
+    }
+
+    /// How many of its spans end before a span, and how many begin before that one's end. The first is
+    /// the place of the frontmost that overlaps it, the second one more than that of the backmost; if it is
+    /// no more, none does.
+    #[inline(always)]
+    fn counts(&self, simd: S, [entry, exit]: [f32; 2]) -> [u32; 2] {
+        let ended = self.depths.simd_lt(f32x16::splat(simd, entry)).to_bitmask() & self.exits;
+        let begun = self.depths.simd_le(f32x16::splat(simd, exit)).to_bitmask() & self.entries;
+        [ended.count_ones(), begun.count_ones()]
+    }
+}
+
+/// Listing 1 for a column towards all four sides, by counting: that a neighbour reaches the preceding span, too, is
+/// to say that this one's frontmost neighbour begins before the preceding one's end.
+#[inline(always)]
+fn connect_quickly<S: Simd>(simd: S, own: &[f32], near: &[Near<S>; 4], links: &mut [Links]) {
+    let mut before = [0; 4];
+    let mut now = [[0; 2]; 4];
+    for side in 0..4 {
+        now[side] = near[side].counts(simd, [own[0], own[1]]);
+    }
+    let behind = own[2..].chunks_exact(2).map(Some).chain([None]);
+    for (links, span) in links.chunks_exact_mut(2).zip(behind) {
+        let mut next = [[u32::MAX; 2]; 4];
+        if let Some(span) = span {
+            for side in 0..4 {
+                next[side] = near[side].counts(simd, [span[0], span[1]]);
+            }
+        }
+        for side in 0..4 {
+            let [front, back] = now[side];
+            let alone = front >= back;
+            let entry = if front < before[side] { PRECEDING } else { 2 * front as u8 };
+            let exit =
+                if back > next[side][0] { FOLLOWING } else { (2 * back as u8).wrapping_sub(1) };
+            links[0][side] = if alone { FOLLOWING } else { entry };
+            links[1][side] = if alone { PRECEDING } else { exit };
+            before[side] = back;
+        }
+        now = next;
+    }
+}
+
+/// The links of the column of a pixel, side by side.
+fn connect_plainly(spans: &Spans, pixel: [usize; 2], links: &mut [Links]) {
+    let size = [spans.size.0 as usize, spans.size.1 as usize];
+    let column = |[x, y]: [usize; 2]| column(spans, y * size[0] + x);
+    for side in Side::ALL {
+        match side.neighbor(pixel, size) {
+            Some(next) => connect_columns(column(pixel), column(next), (links, side)),
+            None => itself(links, side),
+        }
+    }
 }
 
 /// A part of a list of values, one for each surface, for each row of the picture.
@@ -132,7 +239,7 @@ pub(crate) struct Net<'a> {
 }
 
 /// A surface and the pixel that it is in.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub pixel: [usize; 2],
     pub surface: usize,
@@ -159,7 +266,7 @@ impl<'a> Net<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// The links towards `next` of the two ends of each span of `own`.
@@ -196,7 +303,7 @@ mod tests {
         let mut spans = Spans { size: (3, 2), ..Spans::default() };
         spans.starts = vec![0, 1, 3, 4, 4, 5, 5];
         spans.depths = vec![1.0, 2.0, 1.0, 2.0, 3.0, 4.0, 3.5, 5.0, 0.0, 6.0];
-        let links = connect(&spans);
+        let links = connect(&spans, Level::new());
         assert_eq!(links[0], [0, 0, 0, FOLLOWING]);
         assert_eq!(links[2], [0, FOLLOWING, 0, 0]);
         assert_eq!(links[3], [1, PRECEDING, 1, FOLLOWING]);
@@ -204,5 +311,58 @@ mod tests {
         assert_eq!(links[5], [PRECEDING, 1, 3, 1]);
         assert_eq!(links[8], [FOLLOWING, FOLLOWING, 0, 0]);
         assert_eq!(links[9], [PRECEDING, PRECEDING, 3, 1]);
+    }
+
+    /// Columns of up to `most` spans, with many ends at the same depth.
+    pub(crate) fn random(size: (u32, u32), most: u64) -> Spans {
+        let mut seed = 1_u64;
+        let mut random = move |below: u64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) % below
+        };
+        let mut spans = Spans { size, near: 0.5, far: 1e3, starts: vec![0], ..Spans::default() };
+        for _ in 0..size.0 * size.1 {
+            let mut at = 10 + random(4);
+            for _ in 0..random(most + 1) {
+                let exit = at + random(6);
+                spans.depths.extend([at as f32, exit as f32]);
+                at = exit + 1 + random(4);
+            }
+            spans.starts.push(spans.depths.len() as u32 / 2);
+        }
+        spans
+    }
+
+    #[test]
+    fn counting_finds_the_same_links() {
+        let levels = [Level::new(), Level::baseline()];
+        for (most, level) in [1, 2, 5, 8, 12].into_iter().flat_map(|m| levels.map(|l| (m, l))) {
+            let spans = random((40, 30), most);
+            let links = connect(&spans, level);
+            for (x, y) in (0..30).flat_map(|y| (0..40).map(move |x| (x, y))) {
+                let of = spans.of(y * 40 + x);
+                let mut expected = vec![Links::default(); 2 * of.len()];
+                connect_plainly(&spans, [x, y], &mut expected);
+                assert_eq!(links[2 * of.start..2 * of.end], expected, "{most} ({x}, {y})");
+            }
+        }
+    }
+
+    #[test]
+    fn links_are_mutual() {
+        let spans = random((40, 30), 5);
+        let links = connect(&spans, Level::new());
+        let net = Net::new(&spans, &links);
+        let back = [Side::Right, Side::Left, Side::Down, Side::Up];
+        for (x, y) in (0..30).flat_map(|y| (0..40).map(move |x| (x, y))) {
+            let of = spans.of(y * 40 + x);
+            for at in (2 * of.start..2 * of.end).map(|surface| Place { pixel: [x, y], surface }) {
+                for side in Side::ALL {
+                    let next = net.follow(at, side);
+                    let there = if next.pixel == at.pixel { side } else { back[side as usize] };
+                    assert_eq!(net.follow(next, there).surface, at.surface, "{at:?} {side:?}");
+                }
+            }
+        }
     }
 }
