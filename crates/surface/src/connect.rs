@@ -10,9 +10,7 @@
 //! list, [`PRECEDING`] or [`FOLLOWING`] in the own one. Beyond the edge of the picture a surface goes on as it is: it is
 //! linked to itself.
 
-use std::ops::Range;
-
-use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*, u8x64, u16x32, u32x16};
 use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
@@ -66,108 +64,138 @@ pub fn connect(spans: &Spans, level: Level) -> Vec<Links> {
 }
 
 /// Those of a row of columns.
+///
+/// Listing 1 by counting: of a neighbouring column's spans, `front` end before a span and `back` begin before its
+/// end. Then the frontmost that overlaps it is number `front`, the backmost `back` − 1, and there is none if `back` is
+/// no more than `front`. That one reaches the preceding span, too, says that `front` is less than the
+/// preceding one's `back`.
 #[simd]
-fn connect_row<S: Simd>(simd: S, spans: &Spans, y: usize, mut row: &mut [Links]) {
+fn connect_row<S: Simd>(simd: S, spans: &Spans, y: usize, row: &mut [Links]) {
     let [width, height] = [spans.size.0 as usize, spans.size.1 as usize];
+    let first = spans.starts[y * width] as usize;
+    let mut marks = Marks::of(row.len() / 2);
+    let mut plain = Vec::new();
     for x in 0..width {
         let pixel = y * width + x;
-        let own = column(spans, pixel);
-        let (links, rest) = std::mem::take(&mut row).split_at_mut(own.len());
-        row = rest;
+        let own = spans.of(pixel);
         if own.is_empty() {
             continue;
         }
         let inside = x > 0 && x + 1 < width && y > 0 && y + 1 < height;
-        // In the order of sides.
-        let around = if inside {
-            [pixel - 1, pixel + 1, pixel - width, pixel + width].map(|p| spans.of(p))
-        } else {
-            Default::default()
-        };
-        if inside && around.iter().all(|of| fits(spans, of)) {
-            let [left, right, up, down] = around;
-            let near = [
-                Near::of(simd, spans, left),
-                Near::of(simd, spans, right),
-                Near::of(simd, spans, up),
-                Near::of(simd, spans, down),
-            ];
-            connect_quickly(simd, own, &near, links);
-        } else {
-            connect_plainly(spans, [x, y], links);
+        if !inside || !marks.find(simd, spans, pixel, own.start - first) {
+            plain.push(x);
         }
+    }
+    marks.links(simd, row);
+    for x in plain {
+        let own = spans.of(y * width + x);
+        connect_plainly(spans, [x, y], &mut row[2 * (own.start - first)..2 * (own.end - first)]);
     }
 }
 
 /// Surfaces of a column that are looked at together.
 const LANES: usize = 16;
+/// Spans whose links are found together, and their numbers: one for each side.
+const SPANS: usize = 16;
+const SIDES: usize = 4;
 
-/// Whether a column's surfaces are so few, and enough values behind them for all lanes.
-#[inline]
-fn fits(spans: &Spans, of: &Range<usize>) -> bool {
-    2 * of.len() <= LANES && 2 * of.start + LANES <= spans.depths.len()
+/// What the spans of a row have beside them, with one more before the first and some behind the last.
+struct Marks {
+    /// On each side, a bit for each surface: of an entry, whether it lies before the span's exit; of an exit, whether
+    /// it lies before the span's entry.
+    before: Vec<[u16; SIDES]>,
+    /// All bits, if the span is not the first one of its column.
+    inner: Vec<[u16; SIDES]>,
 }
 
-/// A neighbouring column of few spans, entries and exits in turns.
-struct Near<S: Simd> {
-    depths: f32x16<S>,
-    /// The lanes that are entries, and exits.
-    entries: u64,
-    exits: u64,
-}
+impl Marks {
+    fn of(count: usize) -> Self {
+        let none = vec![[0; SIDES]; count.next_multiple_of(SPANS) + 2];
+        Self { before: none.clone(), inner: none }
+    }
 
-impl<S: Simd> Near<S> {
+    /// Finds those of a column whose first span is number `at`, if the columns around it are short enough.
     #[inline(always)]
-    fn of(simd: S, spans: &Spans, of: Range<usize>) -> Self {
-        let all = (1 << (2 * of.len())) - 1;
-        let depths = &spans.depths[2 * of.start..2 * of.start + LANES];
-        Self {
-            depths: f32x16::from_slice(simd, depths),
-            entries: all & 0x5555,
-            exits: all & 0xaaaa,
+    fn find<S: Simd>(&mut self, simd: S, spans: &Spans, pixel: usize, at: usize) -> bool {
+        let width = spans.size.0 as usize;
+        let mut near = [f32x16::splat(simd, 0.0); SIDES];
+        let mut valid = [0; SIDES];
+        let pixels = [pixel - 1, pixel + 1, pixel - width, pixel + width];
+        for side in 0..SIDES {
+            let of = spans.of(pixels[side]);
+            let depths = spans.depths.get(2 * of.start..2 * of.start + LANES);
+            let Some(depths) = depths.filter(|_| 2 * of.len() <= LANES) else { return false };
+            near[side] = f32x16::from_slice(simd, depths);
+            valid[side] = ((1_u32 << (2 * of.len())) - 1) as u16;
         }
-    }
-
-    /// How many of its spans end before a span, and how many begin before that one's end. The first is
-    /// the place of the frontmost that overlaps it, the second one more than that of the backmost; if it is
-    /// no more, none does.
-    #[inline(always)]
-    fn counts(&self, simd: S, [entry, exit]: [f32; 2]) -> [u32; 2] {
-        let ended = self.depths.simd_lt(f32x16::splat(simd, entry)).to_bitmask() & self.exits;
-        let begun = self.depths.simd_le(f32x16::splat(simd, exit)).to_bitmask() & self.entries;
-        [ended.count_ones(), begun.count_ones()]
-    }
-}
-
-/// Listing 1 for a column towards all four sides, by counting: that a neighbour reaches the preceding span, too, is
-/// to say that this one's frontmost neighbour begins before the preceding one's end.
-#[inline(always)]
-fn connect_quickly<S: Simd>(simd: S, own: &[f32], near: &[Near<S>; 4], links: &mut [Links]) {
-    let mut before = [0; 4];
-    let mut now = [[0; 2]; 4];
-    for side in 0..4 {
-        now[side] = near[side].counts(simd, [own[0], own[1]]);
-    }
-    let behind = own[2..].chunks_exact(2).map(Some).chain([None]);
-    for (links, span) in links.chunks_exact_mut(2).zip(behind) {
-        let mut next = [[u32::MAX; 2]; 4];
-        if let Some(span) = span {
-            for side in 0..4 {
-                next[side] = near[side].counts(simd, [span[0], span[1]]);
+        let exits = mask32x16::from_bitmask(simd, 0xaaaa);
+        let own = column(spans, pixel);
+        let own_marks = at + 1..at + 1 + own.len() / 2;
+        for (before, span) in self.before[own_marks.clone()].iter_mut().zip(own.chunks_exact(2)) {
+            // Before the entry is: not behind the next lower value.
+            let [entry, exit] = [span[0].next_down(), span[1]];
+            let bound = exits.select(f32x16::splat(simd, entry), f32x16::splat(simd, exit));
+            for side in 0..SIDES {
+                before[side] = near[side].simd_le(bound).to_bitmask() as u16 & valid[side];
             }
         }
-        for side in 0..4 {
-            let [front, back] = now[side];
-            let alone = front >= back;
-            let entry = if front < before[side] { PRECEDING } else { 2 * front as u8 };
-            let exit =
-                if back > next[side][0] { FOLLOWING } else { (2 * back as u8).wrapping_sub(1) };
-            links[0][side] = if alone { FOLLOWING } else { entry };
-            links[1][side] = if alone { PRECEDING } else { exit };
-            before[side] = back;
-        }
-        now = next;
+        self.inner[own_marks][1..].fill([u16::MAX; SIDES]);
+        true
     }
+
+    /// The links of all spans.
+    #[inline(always)]
+    fn links<S: Simd>(&self, simd: S, links: &mut [Links]) {
+        for (at, links) in (1..).step_by(SPANS).zip(links.chunks_mut(2 * SPANS)) {
+            let [entries, exits] = self.ends(simd, at);
+            let [more_entries, more_exits] = self.ends(simd, at + SPANS / 2);
+            let entries = entries.narrow(more_entries).bitcast::<u32x16<S>>();
+            let exits = exits.narrow(more_exits).bitcast::<u32x16<S>>();
+            let mut words = [0; 2 * SPANS * SIDES];
+            let (low, high) = words.split_at_mut(SPANS * SIDES);
+            entries.zip_low(exits).bitcast::<u8x64<S>>().store_slice(low);
+            entries.zip_high(exits).bitcast::<u8x64<S>>().store_slice(high);
+            let links = bytemuck::cast_slice_mut::<Links, u8>(links);
+            links.copy_from_slice(&words[..links.len()]);
+        }
+    }
+
+    /// The links of the entries, and of the exits, of eight spans.
+    #[inline(always)]
+    fn ends<S: Simd>(&self, simd: S, at: usize) -> [u16x32<S>; 2] {
+        let marks = lanes(simd, &self.before, at);
+        let (front, back) = (ended(marks), begun(marks));
+        let preceding = begun(lanes(simd, &self.before, at - 1) & lanes(simd, &self.inner, at));
+        let following = ended(lanes(simd, &self.before, at + 1) | !lanes(simd, &self.inner, at + 1));
+        let none = front.simd_ge(back);
+        let [to_preceding, to_following] = [
+            u16x32::splat(simd, u16::from(PRECEDING)),
+            u16x32::splat(simd, u16::from(FOLLOWING)),
+        ];
+        let entries = front.simd_lt(preceding).select(to_preceding, front << 1);
+        let exits = back.simd_gt(following).select(to_following, (back << 1) - 1);
+        [none.select(to_following, entries), none.select(to_preceding, exits)]
+    }
+}
+
+/// The marks of eight spans.
+#[inline(always)]
+fn lanes<S: Simd>(simd: S, marks: &[[u16; SIDES]], at: usize) -> u16x32<S> {
+    u16x32::from_slice(simd, bytemuck::cast_slice(&marks[at..at + SPANS / 2]))
+}
+
+/// How many spans end before another one.
+#[inline(always)]
+fn ended<S: Simd>(marks: u16x32<S>) -> u16x32<S> {
+    begun(marks >> 1)
+}
+
+/// How many begin before its end.
+#[inline(always)]
+fn begun<S: Simd>(marks: u16x32<S>) -> u16x32<S> {
+    let pairs = (marks & 0x1111) + ((marks >> 2) & 0x1111);
+    let fours = (pairs & 0x0f0f) + ((pairs >> 4) & 0x0f0f);
+    (fours & 0xff) + (fours >> 8)
 }
 
 /// The links of the column of a pixel, side by side.

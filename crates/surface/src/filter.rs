@@ -39,8 +39,8 @@ pub fn depth(nearness: f32, projection: Projection) -> f32 {
 pub struct Scale {
     /// Standard deviation, pixels: this in orthographic projection, times nearness in perspective.
     sigma: f32,
-    /// What is a leap: in the world.
-    leap: f32,
+    /// What is a leap, in the world: in orthographic projection, and in perspective, times nearness twice.
+    pub(crate) leap: [f32; 2],
     /// Diameter of a drop, in the world, and what part of smoothing each unit of thickness brings beyond it.
     pub(crate) drop: f32,
     pub(crate) per_thickness: f32,
@@ -53,7 +53,10 @@ impl Scale {
     pub fn new(radius: f32, drop: f32, view: &View) -> Self {
         Self {
             sigma: radius / view.rays.pixel,
-            leap: LEAP * radius,
+            leap: match view.rays.projection {
+                Projection::Perspective => [0.0, LEAP * radius],
+                Projection::Orthographic => [LEAP * radius, 0.0],
+            },
             drop,
             per_thickness: 1.0 / (THICK * drop).max(f32::MIN_POSITIVE),
             projection: view.rays.projection,
@@ -70,12 +73,9 @@ impl Scale {
     }
 
     /// The difference of nearness that is a leap.
-    #[inline]
+    #[inline(always)]
     pub fn leap(&self, nearness: f32) -> f32 {
-        match self.projection {
-            Projection::Perspective => self.leap * nearness * nearness,
-            Projection::Orthographic => self.leap,
-        }
+        self.leap[0] + self.leap[1] * nearness * nearness
     }
 }
 

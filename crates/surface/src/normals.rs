@@ -14,7 +14,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, dispatch, f32x16, i32x16, prelude::*, u32x16};
+use fearless_simd::{Level, dispatch, f32x16, i32x16, prelude::*, u32x4, u32x16};
 use fearless_simd_macros::simd;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -66,6 +66,8 @@ pub fn normals(
 /// Rows of pixels that are worked on together.
 const BAND: usize = 32;
 const LANES: usize = 16;
+/// Twice a bent link less this is one back or one on.
+const BENT: u32 = PRECEDING as u32 + FOLLOWING as u32;
 
 /// What normals are found from.
 struct Net<'a> {
@@ -135,7 +137,7 @@ impl Line {
         self.links.resize(row.len(), 0);
         self.x.resize(row.len(), 0.0);
         self.along.resize(row.len(), 0.0);
-        self.look_around(net, y);
+        self.look_around(simd, net, y);
         let across = &mut across.per_pixel[row.start - across.first..row.end - across.first];
         let both = across.iter_mut().zip(&mut self.along);
         for ((across, along), [left, right, up, down]) in both.zip(&self.around) {
@@ -148,11 +150,13 @@ impl Line {
 
     /// Finds which surfaces those of row `y` are linked to.
     #[inline(always)]
-    fn look_around(&mut self, net: &Net<'_>, y: usize) {
+    fn look_around<S: Simd>(&mut self, simd: S, net: &Net<'_>, y: usize) {
         let [width, height] = [net.spans.size.0 as usize, net.spans.size.1 as usize];
         let row = net.row(y);
         let [up, down] = [y > 0, y + 1 < height].map(usize::from);
         let rims = (1 - up as u32) * 0xff_0000 | (1 - down as u32) * 0xff00_0000;
+        let shifts = u32x4::from_slice(simd, &[0, 8, 16, 24]);
+        let straight = u32x4::splat(simd, u32::from(PRECEDING));
         for x in 0..width {
             let pixel = y * width + x;
             let own = net.spans.of(pixel);
@@ -164,18 +168,15 @@ impl Line {
             for side in 0..4 {
                 first[side] = 2 * net.spans.starts[pixels[side]];
             }
+            let first = u32x4::from_slice(simd, &first);
             for surface in own {
-                let (i, links) = (surface - row.start, net.links[surface]);
-                for side in 0..4 {
-                    let link = u32::from(links[side]);
-                    // Bent, one back or one on.
-                    let bent =
-                        surface as u32 + 2 * link - (u32::from(PRECEDING) + u32::from(FOLLOWING));
-                    let straight = first[side] + link;
-                    self.around[i][side] =
-                        if link < u32::from(PRECEDING) { straight } else { bent };
-                }
-                self.links[i] = u32::from_le_bytes(links) | rims;
+                let i = surface - row.start;
+                let links = u32::from_le_bytes(net.links[surface]);
+                let places = (u32x4::splat(simd, links) >> shifts) & 0xff;
+                let bent = (places << 1) + (surface as u32).wrapping_sub(BENT);
+                let around = places.simd_lt(straight).select(first + places, bent);
+                around.store_slice(&mut self.around[i]);
+                self.links[i] = links | rims;
                 self.x[i] = x as f32;
             }
         }

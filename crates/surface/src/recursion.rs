@@ -20,7 +20,7 @@ use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
 use crate::Spans;
-use crate::connect::{Links, PRECEDING, Side, rows_mut};
+use crate::connect::{Links, PRECEDING, rows_mut};
 use crate::filter::Scale;
 use motes_scene::Projection;
 
@@ -47,9 +47,10 @@ struct Paths<'a> {
 pub fn smooth(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale, level: Level) {
     let paths = Paths::new(values, (spans, links), scale, level);
     for _ in 0..ROUNDS {
-        rows_mut(values, spans).into_par_iter().enumerate().for_each(|(y, row)| {
-            let all = paths.surfaces([0, y], spans.size.0 as usize);
-            sweep_row(row, (&paths.back[all.clone()], &paths.factors[all]), scale);
+        let mut rows = paths.rows(values);
+        rows.par_chunks_mut(2).for_each(|rows| match rows {
+            [a, b] => sweep_rows([a, b], scale),
+            rows => rows.iter_mut().for_each(|row| sweep_rows([row, &mut Row::default()], scale)),
         });
         strips_mut(values, spans).into_par_iter().enumerate().for_each(|(strip, mut parts)| {
             dispatch!(level, simd => sweep_columns(simd, &mut parts, strip, &paths));
@@ -79,10 +80,17 @@ impl<'a> Paths<'a> {
             let first = 2 * spans.starts[y * spans.size.0 as usize] as usize;
             let all = first..first + factors.len();
             dispatch!(level, simd => find_factors(simd, &values[all.clone()], scale, factors));
-            find_back((spans, y), &links[all.clone()], back);
-            find_up((spans, y), &links[all], up);
+            find_paths((spans, y), &links[all], (back, up));
         });
         paths
+    }
+
+    fn rows<'b>(&'b self, values: &'b mut [f32]) -> Vec<Row<'b>> {
+        let row = |(y, values)| {
+            let all = self.surfaces([0, y], self.spans.size.0 as usize);
+            Row { values, back: &self.back[all.clone()], factors: &self.factors[all] }
+        };
+        rows_mut(values, self.spans).into_iter().enumerate().map(row).collect()
     }
 
     /// The surfaces of `count` pixels of a row from one on.
@@ -146,52 +154,69 @@ fn factor_of<S: Simd>(simd: S, nearness: f32x16<S>, part: f32x16<S>, scale: &Sca
     v * 2.0 / (v * 2.0 + 1.0 + (v * 4.0 + 1.0).sqrt())
 }
 
-/// How far back the surfaces of a row have those that they are linked to on the left.
-fn find_back((spans, y): (&Spans, usize), links: &[Links], back: &mut [u16]) {
+/// How far back the surfaces of row `y` have those that they are linked to on the left, and where in the
+/// strips' parts of the row above those stand that they are linked to there.
+fn find_paths((spans, y): (&Spans, usize), links: &[Links], (back, up): (&mut [u16], &mut [u16])) {
     let width = spans.size.0 as usize;
     let starts = &spans.starts[y * width..=(y + 1) * width];
+    let above = y.saturating_sub(1) * width;
+    let above = &spans.starts[above..=above + width];
     // The first column's surfaces are linked to themselves.
     let mut left = starts[0];
-    for column in starts.windows(2) {
-        let apart = 2 * (column[0] - left) as u16;
-        let own = 2 * (column[0] - starts[0]) as usize..2 * (column[1] - starts[0]) as usize;
-        for (place, (back, link)) in back[own.clone()].iter_mut().zip(&links[own]).enumerate() {
-            let link = link[Side::Left as usize];
-            *back = if link < PRECEDING { apart + place as u16 - u16::from(link) } else { 0 };
-        }
-        left = column[0];
-    }
-}
-
-/// Where in the strips' parts of the row above those stand that a row's surfaces are linked to.
-fn find_up((spans, y): (&Spans, usize), links: &[Links], up: &mut [u16]) {
-    let width = spans.size.0 as usize;
-    let Some(above) = y.checked_sub(1) else { return };
-    let starts = &spans.starts[y * width..=(y + 1) * width];
-    let above = &spans.starts[above * width..=y * width];
+    let mut rest = links.iter().zip(back.iter_mut().zip(up));
     for from in (0..width).step_by(STRIP) {
         let to = (from + STRIP).min(width);
         let none = 2 * (above[to] - above[from]) as u16;
         for x in from..to {
+            let apart = 2 * (starts[x] - left) as u16;
             let first = 2 * (above[x] - above[from]) as u16;
-            let own =
-                2 * (starts[x] - starts[0]) as usize..2 * (starts[x + 1] - starts[0]) as usize;
-            for (up, link) in up[own.clone()].iter_mut().zip(&links[own]) {
-                let link = link[Side::Up as usize];
-                *up = if link < PRECEDING { first + u16::from(link) } else { none };
+            left = starts[x];
+            let own = 2 * (starts[x + 1] - starts[x]) as u16;
+            for (place, (links, (back, up))) in (0..own).zip(&mut rest) {
+                let [left, _, above, _] = *links;
+                *back = if left < PRECEDING { apart + place - u16::from(left) } else { 0 };
+                *up = if above < PRECEDING { first + u16::from(above) } else { none };
             }
         }
     }
 }
 
-/// Sweeps a row to the right and back.
-fn sweep_row(row: &mut [f32], (back, factors): (&[u16], &[f32]), scale: &Scale) {
-    for (i, (back, factor)) in back.iter().zip(factors).enumerate() {
-        row[i] = drawn(row[i], row[i - *back as usize], (*factor, scale));
+/// A row of pixels; of each surface its value, how far back that on the left is, and the factor.
+#[derive(Default)]
+struct Row<'a> {
+    values: &'a mut [f32],
+    back: &'a [u16],
+    factors: &'a [f32],
+}
+
+impl Row<'_> {
+    #[inline(always)]
+    fn draw_right(&mut self, i: usize, scale: &Scale) {
+        let left = i - self.back[i] as usize;
+        self.values[i] = drawn(self.values[i], self.values[left], (self.factors[i], scale));
     }
-    for (i, back) in back.iter().enumerate().rev() {
-        let left = i - *back as usize;
-        row[left] = drawn(row[left], row[i], (factors[left], scale));
+
+    #[inline(always)]
+    fn draw_left(&mut self, i: usize, scale: &Scale) {
+        let left = i - self.back[i] as usize;
+        self.values[left] = drawn(self.values[left], self.values[i], (self.factors[left], scale));
+    }
+}
+
+/// Sweeps two rows to the right and back, in turns: while one's value waits for that before it, the other's goes on.
+fn sweep_rows([a, b]: [&mut Row<'_>; 2], scale: &Scale) {
+    let both = a.values.len().min(b.values.len());
+    for i in 0..both {
+        a.draw_right(i, scale);
+        b.draw_right(i, scale);
+    }
+    (both..a.values.len()).for_each(|i| a.draw_right(i, scale));
+    (both..b.values.len()).for_each(|i| b.draw_right(i, scale));
+    (both..a.values.len()).rev().for_each(|i| a.draw_left(i, scale));
+    (both..b.values.len()).rev().for_each(|i| b.draw_left(i, scale));
+    for i in (0..both).rev() {
+        a.draw_left(i, scale);
+        b.draw_left(i, scale);
     }
 }
 
@@ -256,10 +281,7 @@ fn draw<S: Simd>(simd: S, row: &mut [f32], (to, factors): (&[f32], &[f32]), scal
     for (own, (to, factor)) in (&mut own).zip((&mut to).zip(&mut factors)) {
         let value = f32x16::from_slice(simd, own);
         let difference = f32x16::from_slice(simd, to) - value;
-        let leap = match scale.projection {
-            Projection::Perspective => value * scale.leap(1.0) * value,
-            Projection::Orthographic => f32x16::splat(simd, scale.leap(1.0)),
-        };
+        let leap = value * scale.leap[1] * value + scale.leap[0];
         let moved = value + f32x16::from_slice(simd, factor) * difference;
         difference.abs().simd_le(leap).select(moved, value).store_slice(own);
     }
@@ -273,7 +295,7 @@ fn draw<S: Simd>(simd: S, row: &mut [f32], (to, factors): (&[f32], &[f32]), scal
 mod tests {
     use super::*;
     use crate::connect::tests::random;
-    use crate::connect::{Net, Place, connect};
+    use crate::connect::{Net, Place, Side, connect};
     use crate::filter::tests::{sheet, view};
     use crate::filter::{depth, nearness};
 
