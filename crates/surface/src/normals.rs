@@ -152,11 +152,11 @@ impl Line {
     #[inline(always)]
     fn look_around<S: Simd>(&mut self, simd: S, net: &Net<'_>, y: usize) {
         let [width, height] = [net.spans.size.0 as usize, net.spans.size.1 as usize];
-        let row = net.row(y);
         let [up, down] = [y > 0, y + 1 < height].map(usize::from);
         let rims = (1 - up as u32) * 0xff_0000 | (1 - down as u32) * 0xff00_0000;
         let shifts = u32x4::from_slice(simd, &[0, 8, 16, 24]);
         let straight = u32x4::splat(simd, u32::from(PRECEDING));
+        let mut places = self.around.iter_mut().zip(&mut self.links).zip(&mut self.x);
         for x in 0..width {
             let pixel = y * width + x;
             let own = net.spans.of(pixel);
@@ -169,15 +169,14 @@ impl Line {
                 first[side] = 2 * net.spans.starts[pixels[side]];
             }
             let first = u32x4::from_slice(simd, &first);
-            for surface in own {
-                let i = surface - row.start;
+            for (surface, ((around, word), column)) in own.zip(&mut places) {
                 let links = u32::from_le_bytes(net.links[surface]);
                 let places = (u32x4::splat(simd, links) >> shifts) & 0xff;
                 let bent = (places << 1) + (surface as u32).wrapping_sub(BENT);
-                let around = places.simd_lt(straight).select(first + places, bent);
-                around.store_slice(&mut self.around[i]);
-                self.links[i] = links | rims;
-                self.x[i] = x as f32;
+                let linked = places.simd_lt(straight).select(first + places, bent);
+                linked.store_slice(around);
+                *word = links | rims;
+                *column = x as f32;
             }
         }
     }
@@ -205,14 +204,12 @@ impl Line {
         let across = &across.per_pixel[row.start - across.first..row.end - across.first];
         let values = &net.values[row];
         let axes = Axes::of(simd, net.view, y);
-        for (normals, at) in normals.chunks_mut(LANES).zip((0..).step_by(LANES)) {
+        for at in (0..normals.len()).step_by(LANES) {
             let by_a = load(simd, beside_across, at) + load(simd, across, at) * 2.0;
             let by_b = load(simd, beside_along, at) + load(simd, &self.along, at) * 2.0;
             let (x, value) = (load(simd, &self.x, at), load(simd, values, at));
             let normal = axes.normal(simd, [by_a, by_b], (x, value));
-            let mut words = [0; LANES];
-            pack_lanes(simd, normal).store_slice(&mut words);
-            normals.copy_from_slice(&words[..normals.len()]);
+            store(pack_lanes(simd, normal), normals, at);
         }
     }
 }
@@ -222,18 +219,24 @@ impl Line {
 #[inline(always)]
 fn per_pixel<S: Simd, const SHIFT: u32>(simd: S, links: &[u32], differences: &mut [f32]) {
     let straight = u32x16::splat(simd, u32::from(PRECEDING));
-    for (links, differences) in links.chunks(LANES).zip(differences.chunks_mut(LANES)) {
-        let mut all = [u32::MAX; LANES];
-        all[..links.len()].copy_from_slice(links);
-        let links = u32x16::from_slice(simd, &all);
+    for at in (0..links.len()).step_by(LANES) {
+        let links = load(simd, bytemuck::cast_slice(links), at).bitcast::<u32x16<S>>();
         let a = ((links >> SHIFT) & 0xff).simd_lt(straight);
         let b = ((links >> (SHIFT + 8)) & 0xff).simd_lt(straight);
         let either = (a | b).select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         let part = (a & b).select(f32x16::splat(simd, 0.5), either);
-        let mut found = [0.0; LANES];
-        (load(simd, differences, 0) * part).store_slice(&mut found);
-        differences.copy_from_slice(&found[..differences.len()]);
+        store(load(simd, differences, at) * part, differences, at);
     }
+}
+
+/// Sixteen values to a place; what is behind the last is dropped.
+#[inline(always)]
+fn store<S: Simd, V: SimdBase<S>>(values: V, to: &mut [V::Element], at: usize) {
+    if let Some(to) = to.get_mut(at..at + LANES) {
+        return values.store_slice(to);
+    }
+    let to = &mut to[at..];
+    to.copy_from_slice(&values.as_slice()[..to.len()]);
 }
 
 /// Sixteen values from one on, zeros behind the last.

@@ -28,7 +28,7 @@ use motes_scene::Projection;
 const ROUNDS: u32 = 2;
 /// Columns of pixels that are swept together: the values of their rows stay in cache, and places in a row's
 /// part are 16-bit numbers.
-const STRIP: usize = 64;
+const STRIP: usize = 128;
 const LANES: usize = 16;
 
 /// What the sweeps go over; of each surface
@@ -47,11 +47,7 @@ struct Paths<'a> {
 pub fn smooth(values: &mut [f32], (spans, links): (&Spans, &[Links]), scale: &Scale, level: Level) {
     let paths = Paths::new(values, (spans, links), scale, level);
     for _ in 0..ROUNDS {
-        let mut rows = paths.rows(values);
-        rows.par_chunks_mut(2).for_each(|rows| match rows {
-            [a, b] => sweep_rows([a, b], scale),
-            rows => rows.iter_mut().for_each(|row| sweep_rows([row, &mut Row::default()], scale)),
-        });
+        paths.pairs(values).into_par_iter().for_each(|rows| sweep_rows(rows, scale));
         strips_mut(values, spans).into_par_iter().enumerate().for_each(|(strip, mut parts)| {
             dispatch!(level, simd => sweep_columns(simd, &mut parts, strip, &paths));
         });
@@ -85,12 +81,18 @@ impl<'a> Paths<'a> {
         paths
     }
 
-    fn rows<'b>(&'b self, values: &'b mut [f32]) -> Vec<Row<'b>> {
+    /// Rows by two, the last one perhaps with none.
+    fn pairs<'b>(&'b self, values: &'b mut [f32]) -> Vec<[Row<'b>; 2]> {
         let row = |(y, values)| {
             let all = self.surfaces([0, y], self.spans.size.0 as usize);
             Row { values, back: &self.back[all.clone()], factors: &self.factors[all] }
         };
-        rows_mut(values, self.spans).into_iter().enumerate().map(row).collect()
+        let mut rows = rows_mut(values, self.spans).into_iter().enumerate().map(row);
+        let mut pairs = Vec::new();
+        while let Some(first) = rows.next() {
+            pairs.push([first, rows.next().unwrap_or_default()]);
+        }
+        pairs
     }
 
     /// The surfaces of `count` pixels of a row from one on.
@@ -191,32 +193,35 @@ struct Row<'a> {
 
 impl Row<'_> {
     #[inline(always)]
-    fn draw_right(&mut self, i: usize, scale: &Scale) {
-        let left = i - self.back[i] as usize;
-        self.values[i] = drawn(self.values[i], self.values[left], (self.factors[i], scale));
+    fn draw_right(&mut self, i: usize, (back, factor): (u16, f32), scale: &Scale) {
+        let before = self.values[i - back as usize];
+        self.values[i] = drawn(self.values[i], before, (factor, scale));
     }
 
     #[inline(always)]
-    fn draw_left(&mut self, i: usize, scale: &Scale) {
-        let left = i - self.back[i] as usize;
+    fn draw_left(&mut self, i: usize, back: u16, scale: &Scale) {
+        let left = i - back as usize;
         self.values[left] = drawn(self.values[left], self.values[i], (self.factors[left], scale));
     }
 }
 
 /// Sweeps two rows to the right and back, in turns: while one's value waits for that before it, the other's goes on.
-fn sweep_rows([a, b]: [&mut Row<'_>; 2], scale: &Scale) {
+fn sweep_rows([mut a, mut b]: [Row<'_>; 2], scale: &Scale) {
     let both = a.values.len().min(b.values.len());
-    for i in 0..both {
-        a.draw_right(i, scale);
-        b.draw_right(i, scale);
+    let in_a = a.back.iter().zip(a.factors);
+    let in_b = b.back.iter().zip(b.factors);
+    for (i, (in_a, in_b)) in in_a.zip(in_b).enumerate() {
+        a.draw_right(i, (*in_a.0, *in_a.1), scale);
+        b.draw_right(i, (*in_b.0, *in_b.1), scale);
     }
-    (both..a.values.len()).for_each(|i| a.draw_right(i, scale));
-    (both..b.values.len()).for_each(|i| b.draw_right(i, scale));
-    (both..a.values.len()).rev().for_each(|i| a.draw_left(i, scale));
-    (both..b.values.len()).rev().for_each(|i| b.draw_left(i, scale));
-    for i in (0..both).rev() {
-        a.draw_left(i, scale);
-        b.draw_left(i, scale);
+    for row in [&mut a, &mut b] {
+        let count = row.values.len();
+        (both..count).for_each(|i| row.draw_right(i, (row.back[i], row.factors[i]), scale));
+        (both..count).rev().for_each(|i| row.draw_left(i, row.back[i], scale));
+    }
+    for (i, (in_a, in_b)) in a.back[..both].iter().zip(&b.back[..both]).enumerate().rev() {
+        a.draw_left(i, *in_a, scale);
+        b.draw_left(i, *in_b, scale);
     }
 }
 
