@@ -166,12 +166,11 @@ impl Marks {
         let marks = lanes(simd, &self.before, at);
         let (front, back) = (ended(marks), begun(marks));
         let preceding = begun(lanes(simd, &self.before, at - 1) & lanes(simd, &self.inner, at));
-        let following = ended(lanes(simd, &self.before, at + 1) | !lanes(simd, &self.inner, at + 1));
+        let following =
+            ended(lanes(simd, &self.before, at + 1) | !lanes(simd, &self.inner, at + 1));
         let none = front.simd_ge(back);
-        let [to_preceding, to_following] = [
-            u16x32::splat(simd, u16::from(PRECEDING)),
-            u16x32::splat(simd, u16::from(FOLLOWING)),
-        ];
+        let [to_preceding, to_following] =
+            [u16x32::splat(simd, u16::from(PRECEDING)), u16x32::splat(simd, u16::from(FOLLOWING))];
         let entries = front.simd_lt(preceding).select(to_preceding, front << 1);
         let exits = back.simd_gt(following).select(to_following, (back << 1) - 1);
         [none.select(to_following, entries), none.select(to_preceding, exits)]

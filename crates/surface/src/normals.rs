@@ -57,8 +57,9 @@ pub fn normals(
     let mut normals = vec![0; values.len()];
     let mut rows = rows_mut(&mut normals, spans);
     let net = Net { spans, links, values, view };
-    rows.par_chunks_mut(BAND).enumerate().for_each(|(band, normals)| {
-        dispatch!(level, simd => find_band(simd, &net, band * BAND, normals));
+    rows.par_chunks_mut(BAND).enumerate().for_each_init(Memory::default, |memory, band| {
+        let (band, normals) = band;
+        dispatch!(level, simd => find_band(simd, &net, (band * BAND, normals), memory));
     });
     normals
 }
@@ -77,7 +78,15 @@ struct Net<'a> {
     view: &'a View,
 }
 
+/// What a thread works with: differences along rows, a row, and the next one.
+#[derive(Default)]
+struct Memory {
+    across: Across,
+    lines: [Line; 2],
+}
+
 /// Differences along rows of pixels, from the surface `first` on.
+#[derive(Default)]
 struct Across {
     first: usize,
     per_pixel: Vec<f32>,
@@ -103,20 +112,26 @@ struct Line {
 /// Differences come first, a row ahead. Then Sobel's operator, the mean of three rows weighted 1, 2, 1, needs only
 /// those of the surface and of two beside it.
 #[simd]
-fn find_band<S: Simd>(simd: S, net: &Net<'_>, from: usize, normals: &mut [&mut [u32]]) {
+fn find_band<S: Simd>(
+    simd: S,
+    net: &Net<'_>,
+    (from, normals): (usize, &mut [&mut [u32]]),
+    memory: &mut Memory,
+) {
     let to = from + normals.len();
     let rows = from.saturating_sub(1)..(to + 1).min(net.spans.size.1 as usize);
     let all = net.row(rows.start).start..net.row(rows.end - 1).end;
-    let mut across = Across { first: all.start, per_pixel: vec![0.0; all.len()] };
-    let (mut line, mut next) = (Line::default(), Line::default());
+    let Memory { across, lines: [line, next] } = memory;
+    across.first = all.start;
+    across.per_pixel.resize(all.len(), 0.0);
     for y in rows.start..=to {
         if y < rows.end {
-            next.read(simd, net, y, &mut across);
+            next.read(simd, net, y, across);
         }
         if y > from {
-            line.find(simd, net, (y - 1, &across), normals[y - 1 - from]);
+            line.find(simd, net, (y - 1, across), normals[y - 1 - from]);
         }
-        std::mem::swap(&mut line, &mut next);
+        std::mem::swap(line, next);
     }
 }
 
