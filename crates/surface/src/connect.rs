@@ -65,10 +65,10 @@ pub fn connect(spans: &Spans, level: Level) -> Vec<Links> {
 
 /// Those of a row of columns.
 ///
-/// Listing 1 by counting: of a neighbouring column's spans, `front` end before a span and `back` begin before its
-/// end. Then the frontmost that overlaps it is number `front`, the backmost `back` − 1, and there is none if `back` is
-/// no more than `front`. That one reaches the preceding span, too, says that `front` is less than the
-/// preceding one's `back`.
+/// Listing 1 by counting: of a neighbouring column's spans, `front` end before a span and `back` begin before
+/// its end. Then the frontmost that overlaps it is number `front`, the backmost `back` − 1, and there is none
+/// if `back` is no more than `front`. That the frontmost reaches the preceding span, too, is to say that
+/// `front` is less than the preceding one's `back`.
 #[simd]
 fn connect_row<S: Simd>(simd: S, spans: &Spans, y: usize, row: &mut [Links]) {
     let [width, height] = [spans.size.0 as usize, spans.size.1 as usize];
@@ -101,8 +101,8 @@ const SIDES: usize = 4;
 
 /// What the spans of a row have beside them, with one more before the first and some behind the last.
 struct Marks {
-    /// On each side, a bit for each surface: of an entry, whether it lies before the span's exit; of an exit, whether
-    /// it lies before the span's entry.
+    /// On each side, a bit for each surface: of an entry, whether it lies before the span's exit; of an exit,
+    /// whether it lies before the span's entry.
     before: Vec<[u16; SIDES]>,
     /// All bits, if the span is not the first one of its column.
     inner: Vec<[u16; SIDES]>,

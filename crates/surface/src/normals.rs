@@ -168,7 +168,7 @@ impl Line {
     fn look_around<S: Simd>(&mut self, simd: S, net: &Net<'_>, y: usize) {
         let [width, height] = [net.spans.size.0 as usize, net.spans.size.1 as usize];
         let [up, down] = [y > 0, y + 1 < height].map(usize::from);
-        let rims = (1 - up as u32) * 0xff_0000 | (1 - down as u32) * 0xff00_0000;
+        let rims = ((1 - up as u32) * 0xff_0000) | ((1 - down as u32) * 0xff00_0000);
         let shifts = u32x4::from_slice(simd, &[0, 8, 16, 24]);
         let straight = u32x4::splat(simd, u32::from(PRECEDING));
         let mut places = self.around.iter_mut().zip(&mut self.links).zip(&mut self.x);
@@ -177,7 +177,7 @@ impl Line {
             let own = net.spans.of(pixel);
             let own = 2 * own.start..2 * own.end;
             let [left, right] = [usize::from(x > 0), usize::from(x + 1 < width)];
-            let rims = rims | (1 - left as u32) * 0xff | (1 - right as u32) * 0xff00;
+            let rims = rims | ((1 - left as u32) * 0xff) | ((1 - right as u32) * 0xff00);
             let pixels = [pixel - left, pixel + right, pixel - up * width, pixel + down * width];
             let mut first = [0; 4];
             for side in 0..4 {
@@ -395,8 +395,8 @@ mod tests {
         }
     }
 
-    /// The definition: differences of values per pixel along both axes of the picture, by Sobel's operator: each the mean of
-    /// three rows weighted 1, 2, 1.
+    /// The definition: differences of values per pixel along both axes of the picture, by Sobel's operator:
+    /// each the mean of three rows weighted 1, 2, 1.
     fn slopes(net: &Net<'_>, at: Place, values: &[f32]) -> [f32; 2] {
         let [left, right, up, down] = Side::ALL.map(|side| net.follow(at, side));
         let difference = |a: Place, b: Place| {
@@ -448,11 +448,12 @@ mod tests {
                 let width = size.0 as usize;
                 for pixel in 0..view.pixels() {
                     let of = spans.of(pixel);
-                    for surface in 2 * of.start..2 * of.end {
+                    let own = 2 * of.start..2 * of.end;
+                    for (surface, word) in own.clone().zip(&found[own]) {
                         let at = Place { pixel: [pixel % width, pixel / width], surface };
                         let expected = normal(at, (&net, &values), &view);
                         // Twice the error of words: sums of another order round to the next one.
-                        let off = unpack(found[surface]).distance(expected);
+                        let off = unpack(*word).distance(expected);
                         assert!(off < 1.3e-4, "{projection:?} {size:?} {at:?}: {off}");
                     }
                 }
