@@ -200,7 +200,7 @@ impl Liquid<'_> {
         };
         let spans =
             Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
-        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, self.level);
         let (width, height) = (image.width as usize, image.height as usize);
         let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
         if layers { with_layers(frame, &surfaces, self.matter.system) } else { Ok(frame) }
@@ -296,12 +296,12 @@ impl Liquid<'_> {
         let (spans, made) = compress(&splatted);
         drop(splatted);
         timed.lap("compress");
-        let links = connect::connect(&spans);
+        let links = connect::connect(&spans, self.level);
         timed.lap("connect");
         let mut nearness = filter::nearness(&spans, view.rays.projection);
-        self.smoothing().apply(&mut nearness, (&spans, &links), &view);
+        self.smoothing().apply(&mut nearness, (&spans, &links), (&view, self.level));
         timed.lap("filter");
-        let normals = normals::normals(&nearness, (&spans, &links), &view);
+        let normals = normals::normals(&nearness, (&spans, &links), &view, self.level);
         timed.lap("normals");
         let bytes = [
             ("items", made.item_bytes),

@@ -1,5 +1,6 @@
 //! Rays through the liquid: against the exact ball lens, and with blocks against without.
 
+use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_scene::{Beyond, Lights, Projection, Rays, Scene, Sight, optics};
 use motes_surface::march::{Ray, march, march_blocks};
@@ -67,7 +68,7 @@ fn a_ball_is_a_lens() {
         let view = view((320, 240), projection);
         let ball = [Sphere { center: DVec3::ZERO, radius: 1.2 }];
         let spans = voxelize((&ball, &[]), &view, 0.0, 7);
-        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, Level::new());
         let optics = Optics {
             mode: Mode::Refractive,
             ior: WATER,
@@ -78,7 +79,7 @@ fn a_ball_is_a_lens() {
         };
         let lights = lights();
         let around = Around {
-            level: fearless_simd::Level::new(),
+            level: Level::new(),
             lights: &lights,
             beyond: &Hues,
             shown: true,
@@ -121,8 +122,9 @@ fn blocks_change_no_hit() {
     for projection in [Projection::Perspective, Projection::Orthographic] {
         let view = view((203, 149), projection);
         let spans = voxelize((&drops(120), &[]), &view, 0.02, 7);
-        let surfaces = Surfaces::new(spans, view, Smoothing { radius: 0.01, ..Smoothing::NONE });
-        let blocks = Blocks::new(fearless_simd::Level::new(), &surfaces);
+        let surfaces =
+            Surfaces::new(spans, view, Smoothing { radius: 0.01, ..Smoothing::NONE }, Level::new());
+        let blocks = Blocks::new(Level::new(), &surfaces);
         let (mut hits, mut plain, mut skipped) = (0, 0, 0);
         for i in 0..40_000_u32 {
             let pixel = (i * 7919) as usize % view.pixels();
@@ -155,7 +157,8 @@ fn thickness_is_what_the_ray_passes() {
     let balls =
         [2.0, 5.0, 8.0].map(|z| Sphere { center: DVec3::new(0.0, 0.0, z - 5.0), radius: 1.0 });
     // Two spans are stored of three; the last counts without what is empty in it.
-    let surfaces = Surfaces::new(voxelize((&balls, &[]), &view, 0.1, 2), view, Smoothing::NONE);
+    let surfaces =
+        Surfaces::new(voxelize((&balls, &[]), &view, 0.1, 2), view, Smoothing::NONE, Level::new());
     let middle = 24 * 64 + 32;
     assert!((surfaces.thickness(middle) - 6.0).abs() < 0.02, "{}", surfaces.thickness(middle));
 }
@@ -166,7 +169,7 @@ fn translucent_pixels_are_what_one_works_out_for_each() {
     for projection in [Projection::Perspective, Projection::Orthographic] {
         let view = view((101, 77), projection);
         let spans = voxelize((&drops(40), &[]), &view, 0.0, 2);
-        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, Level::new());
         let optics = Optics {
             mode: Mode::Translucent,
             ior: WATER,
@@ -177,7 +180,7 @@ fn translucent_pixels_are_what_one_works_out_for_each() {
         };
         let color = Vec3::new(0.2, 0.4, 0.9);
         let around = Around {
-            level: fearless_simd::Level::new(),
+            level: Level::new(),
             lights: &lights,
             beyond: &Hues,
             shown: true,
