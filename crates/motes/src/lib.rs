@@ -22,6 +22,7 @@ mod open;
 mod paint;
 mod picture;
 mod radius;
+mod scenery;
 mod session;
 mod simulate;
 mod stats;

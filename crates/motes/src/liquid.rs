@@ -8,7 +8,7 @@ use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
 use motes_scene::surface::{self, Culling, Filtering};
-use motes_scene::{Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
+use motes_scene::{Beyond, Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
     Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress, connect,
@@ -18,6 +18,7 @@ use motes_surface::{
 use crate::Result;
 use crate::environment::sky_of;
 use crate::paint;
+use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
@@ -82,6 +83,8 @@ pub(crate) struct Liquid<'a> {
     /// The point that positions are about.
     pub origin: DVec3,
     pub level: Level,
+    /// What stands before it and in it.
+    pub others: Option<Others<'a>>,
 }
 
 impl Liquid<'_> {
@@ -162,9 +165,11 @@ impl Liquid<'_> {
         let start = Instant::now();
         let occlusion = (lights.occlusion_rays > 0 && optics.mode != Mode::Refractive)
             .then(|| Occlusion::new(4 * lights.occlusion_rays, self.occlusion_radius(lights)));
+        let scenery = self.others.map(|o| Scenery::new(environment, o, (lights, self.level)));
         let around = Around {
+            level: self.level,
             lights,
-            beyond: environment,
+            beyond: scenery.as_ref().map_or(environment as &dyn Beyond, |s| s),
             shown: self.scene.surface.environment != "none" && !self.scene.image.transparent,
             shadow: shadow.as_ref(),
             occlusion: occlusion.as_ref(),
@@ -195,7 +200,7 @@ impl Liquid<'_> {
         };
         let spans =
             Spans { size: view.size, starts: vec![0; view.pixels() + 1], ..Spans::default() };
-        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, self.level);
         let (width, height) = (image.width as usize, image.height as usize);
         let frame = Frame::new(width, height, vec![[0.0; 4]; width * height])?;
         if layers { with_layers(frame, &surfaces, self.matter.system) } else { Ok(frame) }
@@ -291,12 +296,12 @@ impl Liquid<'_> {
         let (spans, made) = compress(&splatted);
         drop(splatted);
         timed.lap("compress");
-        let links = connect::connect(&spans);
+        let links = connect::connect(&spans, self.level);
         timed.lap("connect");
         let mut nearness = filter::nearness(&spans, view.rays.projection);
-        self.smoothing().apply(&mut nearness, (&spans, &links), &view);
+        self.smoothing().apply(&mut nearness, (&spans, &links), (&view, self.level));
         timed.lap("filter");
-        let normals = normals::normals(&nearness, (&spans, &links), &view);
+        let normals = normals::normals(&nearness, (&spans, &links), &view, self.level);
         timed.lap("normals");
         let bytes = [
             ("items", made.item_bytes),

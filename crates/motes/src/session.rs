@@ -10,13 +10,14 @@ use motes_grid::RadiusClasses;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show};
-use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, Spheres, View};
+use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 
 use crate::annotate::{Annotated, annotations};
 use crate::liquid::{Liquid, Matter};
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
+use crate::scenery::Others;
 use crate::stats::{Stats, peak_memory_bytes};
 use crate::system::Loaded;
 use crate::{Error, Result};
@@ -197,10 +198,6 @@ impl Session {
             ));
         }
 
-        if self.scene.renderer == Renderer::Surface && loaded.len() > 1 {
-            self.notes
-                .push("renderer surface: the first system is drawn, the others are not".into());
-        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
@@ -339,7 +336,7 @@ impl Session {
         Ok(all)
     }
 
-    /// The first system as a liquid.
+    /// The first system as a liquid, the others as spheres before it and in it.
     fn flow(
         &self,
         loaded: &[Loaded],
@@ -347,13 +344,23 @@ impl Session {
         layers: bool,
         stats: &mut Stats,
     ) -> Result<Frame> {
-        let [system, ..] = loaded else {
+        let [system, others @ ..] = loaded else {
             return Err(Error::Usage("renderer surface: no system is visible".into()));
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
         let matter = Matter::of(system);
-        Liquid { scene: &self.scene, matter, resolved, bounds, origin, level }.draw(layers, stats)
+        let systems: Vec<_> = others.iter().map(Loaded::spheres).collect();
+        let paint = Paints(others);
+        let boxes = others.iter().flat_map(|l| l.boxes(origin));
+        let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let corners = boxes.fold(nothing, |[low, high], b| {
+            [low.min((b.min - origin).as_vec3()), high.max((b.max - origin).as_vec3())]
+        });
+        let others = Others { systems: &systems, paint: &paint, bounds: corners };
+        let others = (!systems.is_empty()).then_some(others);
+        let scene = &self.scene;
+        Liquid { scene, matter, resolved, bounds, origin, level, others }.draw(layers, stats)
     }
 
     fn trace(
@@ -365,8 +372,7 @@ impl Session {
     ) -> Result<Frame> {
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<Spheres<'_>> =
-            loaded.iter().map(|l| Spheres { classes: &l.classes, visible: &l.visible }).collect();
+        let systems: Vec<_> = loaded.iter().map(Loaded::spheres).collect();
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
         let view = View { rays: &rays, systems: &systems, paint: &Paints(loaded), lights: &lights };

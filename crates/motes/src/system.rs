@@ -8,6 +8,7 @@ use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, S
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::{Particles, SimulationBox};
 use motes_scene::{Bounds, ColorBy, Scene, System};
+use motes_spheres::Spheres;
 
 use crate::annotate::box_shown;
 use crate::paint::{Paint, find_property};
@@ -81,6 +82,11 @@ impl Loaded {
     /// How many particles pass the filters.
     pub fn count_visible(&self) -> usize {
         self.visible.iter().map(Visibility::visible).sum()
+    }
+
+    /// What a tracer of spheres takes.
+    pub fn spheres(&self) -> Spheres<'_> {
+        Spheres { classes: &self.classes, visible: &self.visible }
     }
 
     /// Boxes around what is visible, with radii, in world coordinates.

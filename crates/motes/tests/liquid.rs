@@ -14,6 +14,34 @@ fn render(assignments: &[&str], threads: usize) -> Picture {
     session.render(0, Layers::Yes, &Quiet).unwrap()
 }
 
+/// The same with a red ball of another system at `at`.
+fn with_ball(assignments: &[&str], at: [f64; 3], radius: f64) -> Vec<[f32; 4]> {
+    let path = std::env::temp_dir().join(format!(
+        "motes-ball-{}-{}.xyz",
+        std::process::id(),
+        (1e3 * at[1]) as i64
+    ));
+    let [x, y, z] = at;
+    std::fs::write(&path, format!("1\nProperties=species:S:1:pos:R:3\nX {x} {y} {z}\n")).unwrap();
+    let mut scene = Scene::default();
+    scene.set_sources(&["demo:dam:2e4".into(), path.display().to_string()]);
+    let ball = [format!("system.1.radius={radius}"), "system.1.color.uniform=#ff0000".into()];
+    let common = [
+        "renderer=surface",
+        "image.width=160",
+        "image.height=120",
+        "image.samples=1",
+        "system.1.color.by=uniform",
+    ];
+    for assignment in common.iter().chain(assignments).copied().chain(ball.iter().map(|s| &**s)) {
+        scene.set_text(assignment).unwrap();
+    }
+    let mut session = Session::open(scene, Some(2)).unwrap();
+    let picture = session.render(0, Layers::No, &Quiet).unwrap();
+    std::fs::remove_file(path).unwrap();
+    picture.raw.color().to_vec()
+}
+
 /// The values of a layer of numbers.
 fn numbers(picture: &Picture, name: &str) -> Vec<f64> {
     let (_, values) = picture.raw.named_values().find(|(n, _)| *n == name).unwrap();
@@ -137,18 +165,6 @@ fn nothing_visible_is_no_liquid() {
 }
 
 #[test]
-fn systems_that_are_not_drawn_are_told() {
-    let mut scene = Scene::default();
-    scene.set_sources(&["demo:dam:1000".into(), "demo:packed:1000".into()]);
-    for assignment in ["renderer=surface", "image.width=8", "image.height=8"] {
-        scene.set_text(assignment).unwrap();
-    }
-    let mut session = Session::open(scene, Some(1)).unwrap();
-    session.render(0, Layers::No, &Quiet).unwrap();
-    assert!(session.warnings().iter().any(|w| w.contains("first system")));
-}
-
-#[test]
 fn a_panorama_that_is_none_is_an_error() {
     let mut scene = Scene::default();
     scene.set_sources(&["demo:dam:1000".into()]);
@@ -159,4 +175,29 @@ fn a_panorama_that_is_none_is_an_error() {
     }
     let error = Session::open(scene, Some(1)).unwrap().render(0, Layers::No, &Quiet).unwrap_err();
     assert!(error.to_string().contains("none.hdr"), "{error}");
+}
+
+#[test]
+fn spheres_of_another_system_stand_before_the_liquid_and_in_it() {
+    let camera = [
+        "camera.position=[0.5, -2.0, 0.6]",
+        "camera.target=[0.5, 0.5, 0.2]",
+        "surface.mode=translucent",
+    ];
+    // How much redder than green a picture is at its middle, which shows the target.
+    let red = |picture: &[[f32; 4]]| {
+        let middle = picture[60 * 160 + 80];
+        middle[0] / middle[1].max(1e-6)
+    };
+    let water = red(render(&camera, 2).raw.color());
+    let before = red(&with_ball(&camera, [0.5, -0.5, 0.36], 0.1));
+    let within = red(&with_ball(&camera, [0.5, 0.3, 0.232], 0.1));
+    assert!(water < 1.1 && before > 3.0, "{water} {before}");
+    // Seen through water that takes most of the red.
+    assert!(within > 1.2 * water && within < before, "{water} {within} {before}");
+    for mode in ["surface.mode=refractive", "surface.mode=front"] {
+        let camera = [camera[0], camera[1], mode];
+        let opaque = red(&with_ball(&camera, [0.5, -0.5, 0.36], 0.1));
+        assert!(opaque > 3.0, "{mode}: {opaque}");
+    }
 }

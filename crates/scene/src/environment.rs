@@ -3,7 +3,10 @@
 //! A ray that leaves its medium asks [`Beyond`] what it meets. Images are equirectangular: column u over
 //! the width is the azimuth about the upward axis, row v over the height the angle from straight up.
 
+use fearless_simd::Level;
 use glam::Vec3;
+
+use crate::look::look;
 
 /// What a ray meets outside its medium: surroundings, floor, particles of another system.
 pub trait Beyond: Sync {
@@ -11,6 +14,26 @@ pub trait Beyond: Sync {
     /// the surroundings where there is nothing; with the distance to it. `None` if there is nothing within a
     /// finite reach.
     fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)>;
+
+    /// The distance to the first thing met within reach.
+    fn distance(&self, sight: &Sight) -> Option<f32> {
+        self.meet(sight).map(|(_, distance)| distance).filter(|d| d.is_finite())
+    }
+
+    /// Whether something may stand before the medium or in it.
+    fn is_amid(&self) -> bool {
+        false
+    }
+
+    /// Appends to `seen` what each of `sights` meets, as if its reach were infinite: in each entry light and
+    /// distance, which is infinite where there is nothing.
+    fn look(&self, level: Level, sights: &[Sight], seen: &mut Vec<(Vec3, f32)>) {
+        let _ = level;
+        seen.extend(sights.iter().map(|sight| {
+            let whole = Sight { reach: f32::INFINITY, ..*sight };
+            self.meet(&whole).unwrap_or((Vec3::ZERO, f32::INFINITY))
+        }));
+    }
 }
 
 /// A ray that is a narrow cone: nothing finer than its width is seen.
@@ -92,7 +115,13 @@ pub struct Floor {
 }
 
 /// Width of a joint between tiles, in tiles.
-const JOINT: f32 = 0.03;
+pub(crate) const JOINT: f32 = 0.03;
+
+/// Colours of a bright day: straight up, at the horizon, below it, of the sun.
+pub(crate) const ZENITH: Vec3 = Vec3::new(0.16, 0.34, 0.68);
+pub(crate) const HORIZON: Vec3 = Vec3::new(0.78, 0.88, 0.98);
+pub(crate) const BELOW: Vec3 = Vec3::new(0.42, 0.44, 0.46);
+pub(crate) const SUN: Vec3 = Vec3::new(1.0, 0.92, 0.78);
 
 impl Environment {
     /// The light from `direction`, a unit vector, where no floor is met.
@@ -124,6 +153,15 @@ impl Beyond for Environment {
             None => None,
         }
     }
+
+    fn distance(&self, sight: &Sight) -> Option<f32> {
+        let distance = self.floor.as_ref()?.distance(sight.origin, sight.direction)?;
+        (distance <= sight.reach).then_some(distance)
+    }
+
+    fn look(&self, level: Level, sights: &[Sight], seen: &mut Vec<(Vec3, f32)>) {
+        look(self, level, sights, seen);
+    }
 }
 
 impl Sky {
@@ -139,10 +177,6 @@ impl Sky {
 
 /// A blue zenith, a bright horizon, a soft sun and grey below.
 fn day(direction: Vec3, up: Vec3, sun: Vec3) -> Vec3 {
-    const ZENITH: Vec3 = Vec3::new(0.16, 0.34, 0.68);
-    const HORIZON: Vec3 = Vec3::new(0.78, 0.88, 0.98);
-    const BELOW: Vec3 = Vec3::new(0.42, 0.44, 0.46);
-    const SUN: Vec3 = Vec3::new(1.0, 0.92, 0.78);
     let height = direction.dot(up);
     let base = match height >= 0.0 {
         true => HORIZON.lerp(ZENITH, height.sqrt()),

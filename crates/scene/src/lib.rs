@@ -28,6 +28,7 @@ mod elements;
 mod environment;
 mod error;
 mod light;
+mod look;
 mod motion;
 pub mod optics;
 mod resolve;
@@ -45,6 +46,7 @@ pub use elements::Element;
 pub use environment::{Beyond, Environment, Equirectangular, Floor, Sight, Sky};
 pub use error::{Result, SceneError, nearest};
 pub use light::{KeyLight, Lamp, Lights, Toward};
+pub use look::exp;
 pub use motion::Moment;
 pub use resolve::{Background, Resolved};
 pub use scene::{

@@ -1,228 +1,242 @@
 //! Blocks: what columns that lie together have in common, so that rays skip them.
 //!
 //! Zirr & Dachsbacher 2015, §6: "ray casting can be accelerated using a hierarchical representation of the
-//! spans akin to mipmapping". A block is a square of [`EDGE`]² columns. Where, at one depth, all its columns
-//! are inside the liquid, or all outside, so is every ray that passes there; the depths between are its
-//! *bands*. A ray that passes no band meets nothing in the block. Squares of [`EDGE`]² blocks have bands, too, of
-//! theirs.
+//! spans akin to mipmapping". A block of level l is a square of 4ˡ × 4ˡ columns. Of the stretches of depth in
+//! which all its columns are outside the liquid, or all inside, it knows four: before all surfaces, behind all,
+//! the longest one inside, and the longest one outside between. A ray that stays in one of them meets nothing
+//! in the block; and what four by four blocks have in common is had from what each has.
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::Surfaces;
 
-/// Columns along a block's edge.
-pub const EDGE: usize = 8;
-/// Most bands of a block: of more, those with the least between them become one.
-const BANDS: usize = 6;
+/// Sizes of blocks: level 1 is the least, this the greatest.
+pub const LEVELS: u32 = 4;
 
-/// Depths, as nearness, at which the columns of a block differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Band {
-    near: f32,
-    far: f32,
-    /// Whether behind it all columns are inside.
-    inside: bool,
+/// Columns, or blocks of the level below, along a block's edge.
+const EDGE: usize = 4;
+
+/// Columns along the edge of a block of the level.
+#[inline]
+pub const fn edge(level: u32) -> i32 {
+    1 << (2 * level)
 }
 
-/// The bands of one block, near ones first.
-#[derive(Clone, Copy, Debug, Default)]
+/// A stretch of nearness without its ends; none if `low` is not less than `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stretch {
+    low: f32,
+    high: f32,
+}
+
+impl Stretch {
+    const NONE: Self = Self { low: f32::INFINITY, high: f32::NEG_INFINITY };
+
+    #[inline]
+    fn both(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
+    }
+
+    #[inline]
+    fn length(self) -> f32 {
+        self.high - self.low
+    }
+
+    #[inline]
+    fn longer(self, other: Self) -> Self {
+        if other.length() > self.length() { other } else { self }
+    }
+
+    #[inline]
+    fn holds(self, [low, high]: [f32; 2]) -> bool {
+        self.low < low && high < self.high
+    }
+
+    fn is_some(self) -> bool {
+        self.low < self.high
+    }
+}
+
+/// What the columns of one block have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Block {
-    bands: [Band; BANDS],
-    count: usize,
+    /// Nearer than this all are outside.
+    before: f32,
+    /// Farther than this all are outside.
+    behind: f32,
+    inside: Stretch,
+    between: Stretch,
+}
+
+impl Block {
+    /// Of no columns.
+    const NOTHING: Self = Self {
+        before: f32::NEG_INFINITY,
+        behind: f32::INFINITY,
+        inside: Stretch { low: f32::NEG_INFINITY, high: f32::INFINITY },
+        between: Stretch::NONE,
+    };
+
+    fn outside(&self) -> [Stretch; 3] {
+        let before = Stretch { low: self.before, high: f32::INFINITY };
+        let behind = Stretch { low: f32::NEG_INFINITY, high: self.behind };
+        [before, self.between, behind]
+    }
 }
 
 /// The blocks of one size.
 #[derive(Clone, Debug, Default)]
-struct Level {
+struct Size {
     blocks: Vec<Block>,
     across: usize,
+    down: usize,
 }
 
-/// The blocks of a picture, with their surfaces: those of a block lie together, for rays that go up and down.
+/// The blocks of a picture.
 #[derive(Clone, Debug)]
 pub struct Blocks {
-    /// Blocks of columns, and blocks of these.
-    levels: [Level; 2],
-    /// Nearness of each surface, block after block, column after column.
-    nearness: Vec<f32>,
-    /// Where each block begins in it, and the columns of it from there.
-    columns: Vec<(u32, [u16; EDGE * EDGE + 1])>,
+    /// Those of level 1 first.
+    levels: Vec<Size>,
+    /// What rays go through them with.
+    pub(crate) level: Level,
 }
 
 impl Blocks {
     /// The blocks of all columns.
-    pub fn new(surfaces: &Surfaces) -> Self {
+    pub fn new(level: Level, surfaces: &Surfaces) -> Self {
         let [width, height] = [surfaces.view.size.0 as usize, surfaces.view.size.1 as usize];
-        let across = width.div_ceil(EDGE);
-        let down = height.div_ceil(EDGE);
-        // The blocks side by side hold what the rows of the picture that they cover do.
-        let mut nearness = vec![0.0; surfaces.nearness.len()];
-        let first = |row: usize| 2 * surfaces.starts[(row * EDGE).min(height) * width] as usize;
-        let mut parts = Vec::with_capacity(down);
-        let mut rest = &mut nearness[..];
-        for row in 0..down {
-            let (part, behind) = rest.split_at_mut(first(row + 1) - first(row));
-            parts.push(part);
-            rest = behind;
-        }
-        let row = |(row, part): (usize, &mut [f32])| {
-            let (mut events, mut at) = (Vec::new(), 0);
-            let mut blocks = Vec::with_capacity(across);
-            for x in (0..width).step_by(EDGE) {
-                let mut columns = [0_u16; EDGE * EDGE + 1];
-                let (begin, mut count) = (at, 0);
-                for i in 0..EDGE * EDGE {
-                    let [x, y] = [x + i % EDGE, row * EDGE + i / EDGE];
-                    if x < width && y < height {
-                        let of = &surfaces.nearness[surfaces.of(y * width + x)];
-                        part[at..at + of.len()].copy_from_slice(of);
-                        at += of.len();
-                        count += 1;
-                    }
-                    columns[i + 1] = (at - begin) as u16;
-                }
-                ends_of_spans((&part[begin..at], &columns), &mut events);
-                let block = Block::new(&mut events, count);
-                blocks.push((block, ((first(row) + begin) as u32, columns)));
+        let [across, down] = [width.div_ceil(EDGE), height.div_ceil(EDGE)];
+        let mut blocks = vec![Block::NOTHING; across * down];
+        let rows = blocks.par_chunks_mut(across.max(1)).enumerate();
+        rows.for_each_init(Vec::new, |common, (row, blocks)| {
+            let ys = row * EDGE..(row * EDGE + EDGE).min(height);
+            for (x, block) in blocks.iter_mut().enumerate() {
+                let xs = x * EDGE..(x * EDGE + EDGE).min(width);
+                let rows = ys.clone().map(|y| y * width + xs.start..y * width + xs.end);
+                *block = of_columns(surfaces, rows, common);
             }
-            blocks
-        };
-        let made: Vec<_> = parts.into_par_iter().enumerate().map(row).collect();
-        let (blocks, columns) = made.into_iter().flatten().unzip();
-        let small = Level { blocks, across };
-        let large = small.grouped(down);
-        Self { levels: [small, large], nearness, columns }
+        });
+        let mut levels = vec![Size { blocks, across, down }];
+        while levels.len() < LEVELS as usize {
+            let above = levels[levels.len() - 1].grouped();
+            levels.push(above);
+        }
+        Self { levels, level }
     }
 
-    /// The nearness of the surfaces of the column (x, y).
-    #[inline]
-    pub(crate) fn column(&self, [x, y]: [usize; 2]) -> &[f32] {
-        let (first, columns) = &self.columns[y / EDGE * self.levels[0].across + x / EDGE];
-        let i = y % EDGE * EDGE + x % EDGE;
-        &self.nearness
-            [*first as usize + columns[i] as usize..*first as usize + columns[i + 1] as usize]
-    }
-
-    /// Whether a ray that is `inside` or not meets nothing in the block at (x, y), in blocks of the level,
-    /// between two values of nearness.
-    #[inline]
-    pub(crate) fn skips(
+    /// Whether a ray inside the liquid or not meets nothing in the block of the level that a pixel is in,
+    /// between two values of nearness, the lower one first.
+    #[inline(always)]
+    pub(crate) fn skips<const INSIDE: bool>(
         &self,
-        level: usize,
-        [x, y]: [usize; 2],
-        ([from, to], inside): ([f32; 2], bool),
+        level: u32,
+        [x, y]: [i32; 2],
+        range: [f32; 2],
     ) -> bool {
-        let level = &self.levels[level];
-        let block = &level.blocks[y * level.across + x];
-        let (near, far) = (from.max(to), from.min(to));
-        let bands = &block.bands[..block.count];
-        // Bands before the ray, and none within it.
-        let before = bands.iter().take_while(|b| b.far > near).count();
-        let meets = bands.get(before).is_some_and(|b| b.near >= far);
-        let state = before > 0 && bands[before - 1].inside;
-        !meets && state == inside
+        let (of, shift) = (&self.levels[level as usize - 1], 2 * level);
+        let block = &of.blocks[(y >> shift) as usize * of.across + (x >> shift) as usize];
+        match INSIDE {
+            true => block.inside.holds(range),
+            false => {
+                let [low, high] = range;
+                block.before < low || block.behind > high || block.between.holds(range)
+            }
+        }
     }
 }
 
-impl Level {
-    /// The blocks of [`EDGE`]² of these, which are `down` from top to bottom.
-    fn grouped(&self, down: usize) -> Self {
-        let across = self.across.div_ceil(EDGE);
-        let group = |(events, i): (&mut Vec<Event>, usize)| {
-            let [x, y] = [i % across * EDGE, i / across * EDGE];
-            events.clear();
-            let mut all = 0;
-            for (x, y) in (y..(y + EDGE).min(down))
-                .flat_map(|y| (x..(x + EDGE).min(self.across)).map(move |x| (x, y)))
-            {
-                all += 1;
-                let block = &self.blocks[y * self.across + x];
-                let mut inside = false;
-                for band in &block.bands[..block.count] {
-                    let out = if inside { -1 } else { 0 };
-                    events.push(Event { nearness: band.near, inside: out, mixed: 1 });
-                    inside = band.inside;
-                    let into = if inside { 1 } else { 0 };
-                    events.push(Event { nearness: band.far, inside: into, mixed: -1 });
-                }
+/// What some columns, given row by row, have in common.
+fn of_columns(
+    surfaces: &Surfaces,
+    rows: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+    common: &mut Vec<Stretch>,
+) -> Block {
+    let mut block = Block::NOTHING;
+    let mut most = 0;
+    for row in rows.clone() {
+        let starts = &surfaces.starts[row.start..=row.end];
+        for pair in starts.windows(2) {
+            let [from, to] = [pair[0] as usize, pair[1] as usize];
+            most = most.max(to - from);
+            if from == to {
+                block.inside = Stretch::NONE;
+                continue;
             }
-            Block::new(events, all)
+            let [first, last] = [surfaces.nearness[2 * from], surfaces.nearness[2 * to - 1]];
+            block.before = block.before.max(first);
+            block.behind = block.behind.min(last);
+            // Of one span; for more, see below.
+            block.inside = block.inside.both(Stretch { low: last, high: first });
+        }
+    }
+    if most < 2 {
+        return block;
+    }
+    let columns = rows.flatten().map(|column| &surfaces.nearness[surfaces.of(column)]);
+    if block.inside.is_some() {
+        common.clear();
+        common.push(Stretch { low: f32::NEG_INFINITY, high: f32::INFINITY });
+        for column in columns.clone() {
+            keep(common, column.chunks_exact(2).map(|s| Stretch { low: s[1], high: s[0] }));
+        }
+        block.inside = common.iter().fold(Stretch::NONE, |all, s| all.longer(*s));
+    }
+    common.clear();
+    common.push(Stretch { low: f32::NEG_INFINITY, high: f32::INFINITY });
+    for column in columns {
+        let ends = |i: usize| column.get(i).copied().unwrap_or(f32::NEG_INFINITY);
+        let gaps =
+            (1..column.len()).step_by(2).map(|i| Stretch { low: ends(i + 1), high: ends(i) });
+        let first = Stretch { low: ends(0), high: f32::INFINITY };
+        keep(common, std::iter::once(first).chain(gaps));
+    }
+    let between = common.iter().filter(|s| s.low > f32::NEG_INFINITY && s.high < f32::INFINITY);
+    block.between = between.fold(Stretch::NONE, |all, s| all.longer(*s));
+    block
+}
+
+/// Leaves of `common` what lies in one of `stretches`, too.
+fn keep(common: &mut Vec<Stretch>, stretches: impl Iterator<Item = Stretch> + Clone) {
+    let before = common.len();
+    for i in 0..before {
+        let one = common[i];
+        common.extend(stretches.clone().map(|s| one.both(s)).filter(|s| s.is_some()));
+    }
+    common.drain(..before);
+}
+
+impl Size {
+    /// The blocks of [`EDGE`]² of these.
+    fn grouped(&self) -> Self {
+        let [across, down] = [self.across.div_ceil(EDGE), self.down.div_ceil(EDGE)];
+        let group = |i: usize| {
+            let [x, y] = [i % across.max(1) * EDGE, i / across.max(1) * EDGE];
+            let rows = (y..(y + EDGE).min(self.down)).map(|y| y * self.across);
+            let xs = x..(x + EDGE).min(self.across);
+            let parts = rows.flat_map(|row| &self.blocks[row + xs.start..row + xs.end]);
+            in_common(parts)
         };
-        let blocks = (0..across * down.div_ceil(EDGE))
-            .into_par_iter()
-            .with_min_len(across)
-            .map_init(Vec::new, |events, i| group((events, i)))
-            .collect();
-        Self { blocks, across }
+        let blocks = (0..across * down).into_par_iter().with_min_len(256).map(group).collect();
+        Self { blocks, across, down }
     }
 }
 
-/// Where parts of a block change: how many more of them are inside behind it, and how many more are neither
-/// inside nor outside throughout.
-#[derive(Clone, Copy)]
-struct Event {
-    nearness: f32,
-    inside: i32,
-    mixed: i32,
-}
-
-/// The ends of all spans of some columns.
-fn ends_of_spans((nearness, columns): (&[f32], &[u16]), events: &mut Vec<Event>) {
-    events.clear();
-    for column in columns.windows(2) {
-        let of = &nearness[column[0] as usize..column[1] as usize];
-        events.extend(of.iter().enumerate().map(|(i, n)| Event {
-            nearness: *n,
-            inside: if i % 2 == 0 { 1 } else { -1 },
-            mixed: 0,
-        }));
+/// What some blocks have in common.
+fn in_common<'a>(parts: impl Iterator<Item = &'a Block> + Clone) -> Block {
+    let mut block = Block::NOTHING;
+    for part in parts.clone() {
+        block.before = block.before.max(part.before);
+        block.behind = block.behind.min(part.behind);
+        block.inside = block.inside.both(part.inside);
+        block.between = block.between.longer(part.between);
     }
-}
-
-impl Block {
-    /// The bands of a block of `all` parts that change like this.
-    fn new(events: &mut [Event], all: i32) -> Self {
-        events.sort_unstable_by(|a, b| b.nearness.total_cmp(&a.nearness));
-        let mut block = Self::default();
-        let mut open: Option<f32> = None;
-        let (mut inside, mut mixed) = (0, 0);
-        for (i, event) in events.iter().enumerate() {
-            let near = *open.get_or_insert(event.nearness);
-            inside += event.inside;
-            mixed += event.mixed;
-            let alike = mixed == 0 && (inside == 0 || inside == all);
-            let last = events.get(i + 1).is_none_or(|next| next.nearness < event.nearness);
-            if alike && last {
-                block.push(Band { near, far: event.nearness, inside: inside == all });
-                open = None;
-            }
-        }
-        block
-    }
-
-    fn push(&mut self, band: Band) {
-        if self.count < BANDS {
-            self.bands[self.count] = band;
-            self.count += 1;
-            return;
-        }
-        let gap = |i: usize| {
-            let next = if i + 1 < BANDS { self.bands[i + 1] } else { band };
-            self.bands[i].far - next.near
-        };
-        let mut least = 0;
-        for i in 1..BANDS {
-            if gap(i) < gap(least) {
-                least = i;
-            }
-        }
-        if least + 1 < BANDS {
-            let next = self.bands[least + 1];
-            self.bands[least] = Band { near: self.bands[least].near, ..next };
-            self.bands.copy_within(least + 2.., least + 1);
-            self.bands[BANDS - 1] = band;
-        } else {
-            self.bands[least] = Band { near: self.bands[least].near, ..band };
+    if block.between.is_some() {
+        for part in parts {
+            let one = block.between;
+            block.between =
+                part.outside().iter().fold(Stretch::NONE, |s, o| s.longer(one.both(*o)));
         }
     }
+    block
 }

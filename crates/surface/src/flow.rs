@@ -120,6 +120,7 @@ mod tests {
     use crate::connect::connect;
     use crate::filter::nearness;
     use crate::filter::tests::{sheet, view};
+    use fearless_simd::Level;
 
     const SIZE: (u32, u32) = (61, 61);
 
@@ -134,7 +135,11 @@ mod tests {
         let view = view(SIZE, projection);
         let mut values = nearness(&spans, projection);
         // σ of three pixels: 18 repetitions.
-        iterate(&mut values, (&spans, &connect(&spans)), (&Scale::new(0.03, 0.0, &view), 20));
+        iterate(
+            &mut values,
+            (&spans, &connect(&spans, Level::new())),
+            (&Scale::new(0.03, 0.0, &view), 20),
+        );
         let weights = (0..61 * 61).map(|i| (i % 61, f64::from(values[2 * i])));
         let (sum, moment) = weights.fold((0.0, 0.0), |(sum, moment), (x, weight)| {
             (sum + weight, moment + weight * (x as f64 - 30.0).powi(2))
@@ -147,7 +152,11 @@ mod tests {
         let spans = sheet(SIZE, bump);
         let view = view(SIZE, Projection::Orthographic);
         let mut values = nearness(&spans, Projection::Orthographic);
-        iterate(&mut values, (&spans, &connect(&spans)), (&Scale::new(1.0, 0.0, &view), 1));
+        iterate(
+            &mut values,
+            (&spans, &connect(&spans, Level::new())),
+            (&Scale::new(1.0, 0.0, &view), 1),
+        );
         assert!((values[2 * (30 * 61 + 30)] - 0.025).abs() < 1e-6);
         assert_eq!(values[2 * (30 * 61 + 32)], 0.0);
     }
@@ -166,7 +175,12 @@ mod tests {
                 let spans = sheet(SIZE, entry);
                 let mut values = nearness(&spans, projection);
                 let scale = Scale::new(0.5, 0.0, &view);
-                curvature(&mut values, (&spans, &connect(&spans)), (&scale, 10), &view);
+                curvature(
+                    &mut values,
+                    (&spans, &connect(&spans, Level::new())),
+                    (&scale, 10),
+                    &view,
+                );
                 for (x, y) in (20..40).flat_map(|x| (20..40).map(move |y| (x, y))) {
                     let found = depth(values[2 * (y * 61 + x)], projection);
                     let off = (found - tilted(x as u32, y as u32)).abs();

@@ -6,7 +6,7 @@
 //! - [`splat()`] and [`compress()`], together [`voxelize()`]: what each pixel's ray passes of it, a short list of
 //!   [`Spans`]
 //! - [`mod@connect`]: which of their ends are one surface
-//! - [`mod@filter`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
+//! - [`mod@filter`], [`mod@recursion`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
 //! - [`shade()`]: pictures, with rays that [`mod@march`] through columns
 //!
 //! [`mod@reference`] is the definition of spans, by brute force in f64; for tests.
@@ -29,6 +29,7 @@ pub mod march;
 pub mod normals;
 mod occlusion;
 mod params;
+pub mod recursion;
 pub mod reference;
 mod refract;
 mod shade;
@@ -38,6 +39,7 @@ mod spans;
 mod splat;
 mod surfaces;
 mod tile;
+mod translucent;
 mod view;
 mod voxelize;
 

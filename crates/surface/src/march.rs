@@ -9,11 +9,13 @@
 //! Columns are steps where the surface is smooth. A ray that leaves a surface, or goes along it, would hit
 //! the next step; so what is met must be met from the right side of its normal, or it is passed over.
 
+use fearless_simd::{Simd, dispatch};
+use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_scene::Projection;
 
 use crate::Surfaces;
-use crate::blocks::{Blocks, EDGE};
+use crate::blocks::{Blocks, LEVELS, edge};
 
 /// A ray, where it starts from and whether that is in the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,20 +43,102 @@ pub struct Hit {
     pub distance: f32,
 }
 
-/// A ray as a line over the picture: place and nearness at its start and their change to its end.
+/// A ray as a line over the picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Line {
-    start: [f32; 3],
-    change: [f32; 3],
-    /// What the way along the line grows by over a pixel, for both axes of the picture.
-    per_pixel: [f32; 2],
+struct Line {
+    x: Axis,
+    y: Axis,
+    /// Nearness at its start, and its change to its end.
+    start: f32,
+    change: f32,
+}
+
+/// A line along one axis of the picture.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    /// Its place at its start, and its change to its end.
+    start: f32,
+    change: f32,
+    /// What the way along the line grows by over a pixel; 0 if it stays in its pixel.
+    per_pixel: f32,
+    /// Then infinite, else 0.
+    never: f32,
+    /// 1 if pixels go up, else 0.
+    up: i32,
 }
 
 /// Lines shorter than this many pixels stay in their column.
 const SHORT: f32 = 1e-4;
 
+impl Axis {
+    fn new(start: f32, end: f32) -> Self {
+        let change = end - start;
+        let short = change.abs() < SHORT;
+        Self {
+            start,
+            change,
+            per_pixel: if short { 0.0 } else { 1.0 / change },
+            never: if short { f32::INFINITY } else { 0.0 },
+            up: i32::from(change > 0.0),
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, u: f32) -> f32 {
+        self.start + self.change * u
+    }
+
+    /// Where along the line it comes to the wall before pixel `place`.
+    #[inline(always)]
+    fn reaches(&self, place: i32) -> f32 {
+        (place as f32 - self.start) * self.per_pixel + self.never
+    }
+
+    /// The wall at which it leaves the cell of the level that `pixel` is in.
+    #[inline(always)]
+    fn border(&self, pixel: i32, level: u32) -> i32 {
+        ((pixel >> (2 * level)) + self.up) << (2 * level)
+    }
+
+    /// +1 or −1.
+    #[inline(always)]
+    fn step(&self) -> i32 {
+        2 * self.up - 1
+    }
+
+    /// Whether a pixel that it steps to is the first one of a cell of the level.
+    #[inline(always)]
+    fn enters(&self, pixel: i32, level: u32) -> bool {
+        (pixel + 1 - self.up) & (edge(level) - 1) == 0
+    }
+
+    /// The last pixel, before the line leaves a cell of the level through a wall of the other axis at `wall`: the
+    /// one that a walk from column to column comes to. `pixel` is one before. Of two walls at one place the
+    /// first axis is crossed first, so that `first` says whether this one is.
+    #[inline(always)]
+    fn last_pixel(&self, pixel: i32, (wall, level): (f32, u32), first: bool) -> i32 {
+        let step = self.step();
+        let border = self.border(pixel, level);
+        let end = border - self.up;
+        // Near to it by arithmetic, then exactly.
+        let least = border - self.up * edge(level);
+        let guess = (self.at(wall) as i32 - 2 * step).clamp(least, least + edge(level) - 1);
+        let mut last = if (guess - pixel) * step > 0 { guess } else { pixel };
+        while last != end {
+            let next = self.reaches(last + self.up);
+            let crossed = if first { next <= wall } else { next < wall };
+            if !crossed {
+                break;
+            }
+            last += step;
+        }
+        last
+    }
+}
+
 impl Line {
     /// The part of `ray` between the near and the far plane.
+    #[inline(always)]
     fn new(surfaces: &Surfaces, ray: &Ray) -> Option<Self> {
         let view = &surfaces.view;
         let rays = &view.rays;
@@ -71,227 +155,177 @@ impl Line {
         let on_picture = |v: Vec3| match rays.projection {
             Projection::Perspective => {
                 let q = 1.0 / v.z;
-                [rays.center[0] + v.x * q, rays.center[1] + v.y * q, q]
+                Vec3::new(rays.center[0] + v.x * q, rays.center[1] + v.y * q, q)
             }
-            Projection::Orthographic => [rays.center[0] + v.x, rays.center[1] + v.y, -v.z],
+            Projection::Orthographic => Vec3::new(rays.center[0] + v.x, rays.center[1] + v.y, -v.z),
         };
         if reach.is_nan() || reach <= 0.0 {
             return None;
         }
         let (start, end) = (on_picture(p), on_picture(p + d * reach));
-        let finite = start.iter().chain(&end).all(|x| x.is_finite());
-        finite.then(|| {
-            let change = [0, 1, 2].map(|i| end[i] - start[i]);
-            Self { start, change, per_pixel: [0, 1].map(|i| 1.0 / change[i]) }
+        (start.is_finite() && end.is_finite()).then(|| Self {
+            x: Axis::new(start.x, end.x),
+            y: Axis::new(start.y, end.y),
+            start: start.z,
+            change: end.z - start.z,
         })
     }
 
-    #[inline]
-    fn at(&self, u: f32) -> [f32; 3] {
-        [0, 1, 2].map(|i| self.start[i] + self.change[i] * u)
-    }
-
-    /// Where along the line it comes to `place` of an axis of the picture.
-    #[inline]
-    fn reaches(&self, axis: usize, place: f32) -> f32 {
-        if self.change[axis].abs() < SHORT {
-            return f32::INFINITY;
-        }
-        (place - self.start[axis]) * self.per_pixel[axis]
-    }
-}
-
-/// Where the surfaces of a column are looked up.
-trait Columns {
-    /// The nearness of the surfaces of the column (x, y).
-    fn column(&self, pixel: [usize; 2]) -> &[f32];
-    /// Blocks to skip.
-    fn blocks(&self) -> Option<&Blocks>;
-}
-
-impl Columns for Surfaces {
-    #[inline]
-    fn column(&self, [x, y]: [usize; 2]) -> &[f32] {
-        &self.nearness[self.of(y * self.view.size.0 as usize + x)]
-    }
-
-    fn blocks(&self) -> Option<&Blocks> {
-        None
-    }
-}
-
-impl Columns for Blocks {
-    #[inline]
-    fn column(&self, pixel: [usize; 2]) -> &[f32] {
-        self.column(pixel)
-    }
-
-    fn blocks(&self) -> Option<&Blocks> {
-        Some(self)
+    #[inline(always)]
+    fn nearness(&self, u: f32) -> f32 {
+        self.start + self.change * u
     }
 }
 
 /// The first surface that `ray` meets, and the number of columns it went through.
 pub fn march(surfaces: &Surfaces, ray: &Ray) -> (Option<Hit>, u32) {
-    march_over((surfaces, surfaces), ray)
+    march_over((surfaces, None), ray)
 }
 
 /// As [`march`], with the same result, over the columns that cannot be skipped.
 pub fn march_blocks((surfaces, blocks): (&Surfaces, &Blocks), ray: &Ray) -> (Option<Hit>, u32) {
-    march_over((surfaces, blocks), ray)
+    dispatch!(blocks.level, simd => march_with(simd, (surfaces, blocks), ray))
 }
 
-fn march_over<C: Columns>((surfaces, columns): (&Surfaces, &C), ray: &Ray) -> (Option<Hit>, u32) {
-    let Some(line) = Line::new(surfaces, ray) else { return (None, 0) };
-    let size = [surfaces.view.size.0 as i32, surfaces.view.size.1 as i32];
-    let at = [line.start[0].floor() as i32, line.start[1].floor() as i32];
+/// One ray needs no vectors, but is faster with the instructions that come with them.
+#[simd]
+fn march_with<S: Simd>(
+    simd: S,
+    (surfaces, blocks): (&Surfaces, &Blocks),
+    ray: &Ray,
+) -> (Option<Hit>, u32) {
+    let _ = simd;
+    march_over((surfaces, Some(blocks)), ray)
+}
+
+#[inline(always)]
+fn march_over(of: (&Surfaces, Option<&Blocks>), ray: &Ray) -> (Option<Hit>, u32) {
+    match Line::new(of.0, ray) {
+        Some(line) if ray.inside => walk::<true>(of, ray, line),
+        Some(line) => walk::<false>(of, ray, line),
+        None => (None, 0),
+    }
+}
+
+#[inline(always)]
+fn walk<const INSIDE: bool>(
+    (surfaces, blocks): (&Surfaces, Option<&Blocks>),
+    ray: &Ray,
+    line: Line,
+) -> (Option<Hit>, u32) {
+    let [width, height] = [surfaces.view.size.0 as i32, surfaces.view.size.1 as i32];
+    let Line { x: across, y: down, .. } = line;
     // A start on the wall between two columns may be rounded to the other one.
-    let mut pixel = [0, 1].map(|i| at[i].clamp(0, size[i] - 1));
-    let step = [0, 1].map(|i| if line.change[i] > 0.0 { 1 } else { -1 });
-    let mut walk = Walk { surfaces, columns, ray, line, before: None };
-    let (mut u, mut count, mut tried) = (0.0_f32, 0, [[-1; 2]; 2]);
+    let mut x = (across.start as i32).clamp(0, width - 1);
+    let mut y = (down.start as i32).clamp(0, height - 1);
+    let walk = Walk { surfaces, ray, line };
+    let (mut u, mut q, mut count, mut level) = (0.0_f32, line.start, 0, 0);
+    let mut before = None;
     loop {
-        if let Some(blocks) = columns.blocks().filter(|_| count > 0) {
-            match line.skip((blocks, ray.inside), (pixel, u), (size, &mut tried)) {
-                Skip::Not => {}
-                Skip::Out => return (None, count),
-                Skip::To { last, next, at } => {
-                    walk.before = Some(last);
-                    (pixel, u) = (next, at);
-                    continue;
+        let wall_x = across.reaches(across.border(x, level));
+        let wall_y = down.reaches(down.border(y, level));
+        let wall = lesser(wall_y, wall_x);
+        let end = lesser(greater(wall, u), 1.0);
+        let q_end = line.nearness(end);
+        let range = [lesser(q, q_end), greater(q, q_end)];
+        if level > 0 {
+            let skips = blocks.is_some_and(|blocks| blocks.skips::<INSIDE>(level, [x, y], range));
+            if !skips {
+                level -= 1;
+                continue;
+            }
+            // The wall is one of both.
+            if wall_y < wall_x {
+                x = across.last_pixel(x, (wall, level), true);
+                y = down.border(y, level) - down.up;
+            } else {
+                y = down.last_pixel(y, (wall, level), false);
+                x = across.border(x, level) - across.up;
+            }
+        } else {
+            count += 1;
+            let first = count == 1;
+            if first || !walk.passes_by::<INSIDE>([x, y], range) {
+                let hit = walk.column([x, y], ([u, end], before), first);
+                if hit.is_some() {
+                    return (hit, count);
                 }
             }
         }
-        let next = [0, 1].map(|i| line.reaches(i, (pixel[i] + step[i].max(0)) as f32));
-        let axis = usize::from(next[1] < next[0]);
-        let end = next[axis].clamp(u, 1.0);
-        count += 1;
-        if let Some(hit) = walk.column(pixel, [u, end], count == 1) {
-            return (Some(hit), count);
-        }
-        pixel[axis] += step[axis];
-        if next[axis] >= 1.0 || pixel[axis] < 0 || pixel[axis] >= size[axis] {
+        if wall >= 1.0 {
             return (None, count);
         }
-        u = end;
+        before = Some([x, y]);
+        (u, q) = (end, q_end);
+        let enters = if wall_y < wall_x {
+            y += down.step();
+            down.enters(y, level + 1)
+        } else {
+            x += across.step();
+            across.enters(x, level + 1)
+        };
+        if x < 0 || y < 0 || x >= width || y >= height {
+            return (None, count);
+        }
+        if enters && level < LEVELS && blocks.is_some() {
+            level += 1;
+        }
     }
 }
 
-/// Whether the rest of a block is skipped.
-enum Skip {
-    Not,
-    /// The line ends in it, or the picture behind it.
-    Out,
-    /// Up to `at`, where the line goes from the pixel `last` to `next`.
-    To {
-        last: [i32; 2],
-        next: [i32; 2],
-        at: f32,
-    },
+/// As `min` and `max`, without the care for what is no number.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
-impl Line {
-    /// Whether the line meets nothing between `u`, where it is in `pixel`, and the end of that block: the
-    /// largest that was not `tried` before.
-    #[inline]
-    fn skip(
-        &self,
-        of: (&Blocks, bool),
-        from: ([i32; 2], f32),
-        (size, tried): ([i32; 2], &mut [[i32; 2]; 2]),
-    ) -> Skip {
-        for level in [1, 0] {
-            let edge = (EDGE as i32).pow(level as u32 + 1);
-            let block = from.0.map(|p| p / edge);
-            if tried[level] != block {
-                tried[level] = block;
-                match self.skip_block(of, from, (size, level)) {
-                    Skip::Not => {}
-                    skip => return skip,
-                }
-            }
-        }
-        Skip::Not
-    }
-
-    fn skip_block(
-        &self,
-        (blocks, inside): (&Blocks, bool),
-        (pixel, u): ([i32; 2], f32),
-        (size, level): ([i32; 2], usize),
-    ) -> Skip {
-        let edge = (EDGE as i32).pow(level as u32 + 1);
-        let block = pixel.map(|p| p / edge);
-        let step = [0, 1].map(|i| if self.change[i] > 0.0 { 1 } else { -1 });
-        let border = [0, 1].map(|i| (block[i] + step[i].max(0)) * edge);
-        let next = [0, 1].map(|i| self.reaches(i, border[i] as f32));
-        let axis = usize::from(next[1] < next[0]);
-        let at = next[axis].clamp(u, 1.0);
-        let range = [u, at].map(|u| self.start[2] + self.change[2] * u);
-        if !blocks.skips(level, block.map(|b| b as usize), (range, inside)) {
-            return Skip::Not;
-        }
-        // The pixel on the other axis is the one that a walk from column to column comes to.
-        let across = 1 - axis;
-        let mut last = pixel;
-        last[axis] = border[axis] - step[axis].max(0);
-        // Near to it by arithmetic, then exactly.
-        let guess = self.start[across] + self.change[across] * at;
-        let guess = (guess.floor() as i32 - step[across] * 2)
-            .clamp(block[across] * edge, block[across] * edge + edge - 1);
-        if (guess - last[across]) * step[across] > 0 {
-            last[across] = guess;
-        }
-        while last[across] != border[across] - step[across].max(0) {
-            let wall = self.reaches(across, (last[across] + step[across].max(0)) as f32);
-            // Of two walls at one place the first axis is crossed first.
-            let crossed = if across == 0 { wall <= next[axis] } else { wall < next[axis] };
-            if !crossed {
-                break;
-            }
-            last[across] += step[across];
-        }
-        let mut next_pixel = last;
-        next_pixel[axis] += step[axis];
-        // A block at the picture's edge may reach beyond it, on both axes.
-        let left = (0..2).any(|i| next_pixel[i] < 0 || next_pixel[i] >= size[i]);
-        if next[axis] >= 1.0 || left {
-            return Skip::Out;
-        }
-        Skip::To { last, next: next_pixel, at }
-    }
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
-struct Walk<'a, C> {
+struct Walk<'a> {
     surfaces: &'a Surfaces,
-    columns: &'a C,
     ray: &'a Ray,
     line: Line,
-    /// The last column.
-    before: Option<[i32; 2]>,
 }
 
-impl<C: Columns> Walk<'_, C> {
-    /// What is met in a column, between two places of the line.
-    #[inline]
-    fn column(&mut self, pixel: [i32; 2], [from, to]: [f32; 2], first: bool) -> Option<Hit> {
-        let list = self.columns.column(pixel.map(|p| p as usize));
-        let before = self.before.replace(pixel);
-        if list.is_empty() && !self.ray.inside {
-            return None;
+/// The surfaces of a column: the first one's number, and their nearness.
+type Column<'a> = (usize, &'a [f32]);
+
+impl<'a> Walk<'a> {
+    /// Whether it is plain that nothing is met in a column in a range of nearness, low and high.
+    #[inline(always)]
+    fn passes_by<const INSIDE: bool>(&self, pixel: [i32; 2], [low, high]: [f32; 2]) -> bool {
+        for span in self.surfaces_of(pixel).1.chunks_exact(2) {
+            let [entry, exit] = [span[0], span[1]];
+            if INSIDE && exit < low {
+                return high < entry;
+            }
+            if !INSIDE && exit <= high {
+                return entry < low;
+            }
         }
-        let [q, end] = [from, to].map(|u| self.line.start[2] + self.line.change[2] * u);
+        !INSIDE
+    }
+
+    /// What is met in a column, between two places of the line. The column `before` is the last one.
+    fn column(
+        &self,
+        pixel: [i32; 2],
+        ([from, to], before): ([f32; 2], Option<[i32; 2]>),
+        first: bool,
+    ) -> Option<Hit> {
+        let (start, list) = self.surfaces_of(pixel);
+        let [q, end] = [self.line.nearness(from), self.line.nearness(to)];
         // How many surfaces lie before the ray's place: inside, if they are odd.
-        let mut count = list.iter().take_while(|n| **n > q).count();
-        let own = self.ray.from.filter(|_| first).and_then(|own| {
-            let of = self.surfaces.of(self.index(pixel));
-            of.contains(&own).then(|| own - of.start)
-        });
+        let mut count = count_before(list, q);
+        let own = self.ray.from.filter(|own| first && (start..start + list.len()).contains(own));
         if let Some(own) = own {
             // Of its own surface the ray is on the side that it goes to.
-            count = own + usize::from(end < q);
+            count = own - start + usize::from(end < q);
         } else if !first && (count % 2 == 1) != self.ray.inside {
-            let hit = self.wall(pixel, (list, count), (before, from));
+            let hit = self.wall((start, list), count, (before, from));
             if hit.is_some() {
                 return hit;
             }
@@ -302,8 +336,8 @@ impl<C: Columns> Walk<'_, C> {
             let next = next.filter(|n| list.get(*n).is_some_and(|n| passes(*n, end, away)))?;
             count = if away { count + 1 } else { count - 1 };
             if (count % 2 == 1) != self.ray.inside {
-                let u = (list[next] - self.line.start[2]) / self.line.change[2];
-                let hit = self.hit(self.surfaces.of(self.index(pixel)).start + next, u);
+                let u = (list[next] - self.line.start) / self.line.change;
+                let hit = self.hit(start + next, u);
                 if hit.is_some() {
                     return hit;
                 }
@@ -311,25 +345,25 @@ impl<C: Columns> Walk<'_, C> {
         }
     }
 
-    fn index(&self, pixel: [i32; 2]) -> usize {
-        pixel[1] as usize * self.surfaces.view.size.0 as usize + pixel[0] as usize
+    #[inline(always)]
+    fn surfaces_of(&self, [x, y]: [i32; 2]) -> Column<'a> {
+        let of = self.surfaces.of(y as usize * self.surfaces.view.size.0 as usize + x as usize);
+        (of.start, &self.surfaces.nearness[of])
     }
 
     /// The wall of a column that is met at `u`: with the normal of the nearest surface in this column or
     /// the one before.
     fn wall(
         &self,
-        pixel: [i32; 2],
-        (list, count): (&[f32], usize),
+        (start, list): Column<'_>,
+        count: usize,
         (before, u): (Option<[i32; 2]>, f32),
     ) -> Option<Hit> {
-        let q = self.line.start[2] + self.line.change[2] * u;
-        let first = |pixel| self.surfaces.of(self.index(pixel)).start;
-        let here = nearest(list, count, q).map(|i| first(pixel) + i);
+        let q = self.line.nearness(u);
+        let here = nearest(list, count, q).map(|i| start + i);
         let there = before.and_then(|pixel| {
-            let list = self.columns.column(pixel.map(|p| p as usize));
-            let count = list.iter().take_while(|n| **n > q).count();
-            nearest(list, count, q).map(|i| first(pixel) + i)
+            let (start, list) = self.surfaces_of(pixel);
+            nearest(list, count_before(list, q), q).map(|i| start + i)
         });
         here.into_iter().chain(there).find_map(|surface| self.hit(surface, u))
     }
@@ -341,11 +375,17 @@ impl<C: Columns> Walk<'_, C> {
         if self.ray.direction.dot(towards) >= 0.0 {
             return None;
         }
-        let [x, y, q] = self.line.at(u);
-        let point = self.surfaces.view.point([x, y], q);
+        let Line { x, y, .. } = &self.line;
+        let point = self.surfaces.view.point([x.at(u), y.at(u)], self.line.nearness(u));
         let distance = point.distance(self.ray.origin);
         Some(Hit { point, surface, normal: towards, distance })
     }
+}
+
+/// How many surfaces of a column lie before a nearness.
+#[inline]
+fn count_before(list: &[f32], q: f32) -> usize {
+    list.iter().take_while(|n| **n > q).count()
 }
 
 #[inline]

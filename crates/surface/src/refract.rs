@@ -5,15 +5,13 @@
 //! internal reflection), up to a number of boundaries. What goes the other way is seen without further
 //! boundaries if it leaves the liquid, and else goes with the rest.
 
-use std::cell::Cell;
-
 use glam::{Vec3, Vec4};
 use motes_scene::{Sight, optics};
 
 use crate::Surfaces;
 use crate::blocks::Blocks;
 use crate::march::{Hit, Ray, march, march_blocks};
-use crate::shade::{Around, Optics, Pixel, Work};
+use crate::shade::{Around, Later, Optics, Pixel, Work};
 
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
 const PART: f32 = 0.02;
@@ -28,7 +26,11 @@ pub(crate) struct Paths<'a> {
     pub around: &'a Around<'a>,
     pub blocks: Option<&'a Blocks>,
     /// What was done so far.
-    pub work: Cell<Work>,
+    pub work: Work,
+    /// What is looked up together.
+    pub later: Later,
+    /// Pixels of translucent liquid that are worked out together.
+    pub waiting: Vec<Pixel>,
 }
 
 impl<'a> Paths<'a> {
@@ -37,38 +39,47 @@ impl<'a> Paths<'a> {
         (optics, around): (&'a Optics, &'a Around<'a>),
         blocks: Option<&'a Blocks>,
     ) -> Self {
-        Self { surfaces, optics, around, blocks, work: Cell::default() }
+        Self {
+            surfaces,
+            optics,
+            around,
+            blocks,
+            work: Work::default(),
+            later: Later::default(),
+            waiting: Vec::new(),
+        }
     }
 
-    /// The light of a pixel whose column holds a surface.
-    pub fn pixel(&self, pixel: &Pixel) -> Vec4 {
-        let first = self.surfaces.of(pixel.index).start;
+    /// Follows the light of a pixel whose column holds a surface; gives what is not looked up later.
+    pub fn pixel(&mut self, pixel: &Pixel) -> Vec4 {
+        let surfaces = self.surfaces;
+        let first = surfaces.of(pixel.index).start;
         let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
-        let point = self.surfaces.view.point([x, y], self.surfaces.nearness[first]);
-        let to_eye = point.distance(pixel.origin);
-        // What stands before the liquid.
-        if let Some((light, _)) = self.around.meet(&Sight { reach: to_eye, ..pixel.sight() }) {
-            return light.extend(1.0);
+        let point = surfaces.view.point([x, y], surfaces.nearness[first]);
+        let before = Sight { reach: point.distance(pixel.origin), ..pixel.sight() };
+        if !self.around.beyond.is_amid() && self.around.beyond.distance(&before).is_some() {
+            // The floor.
+            self.look(pixel, before, Vec3::ONE);
+            return Vec4::W;
         }
         let ray =
             Ray { origin: point, direction: pixel.direction, inside: true, from: Some(first) };
-        if self.surfaces.depth(first) <= self.surfaces.view.near {
-            // The eye is in the liquid.
-            return self.follow(ray, self.color(first)).extend(1.0);
-        }
-        let normal = self.surfaces.normal(first);
-        let split = optics::split(pixel.direction, normal, 1.0 / self.optics.ior);
         let tint = self.color(first);
-        let mut light = Vec3::ZERO;
+        if surfaces.depth(first) <= surfaces.view.near {
+            // The eye is in the liquid.
+            self.follow(ray, (tint, 1.0), pixel);
+            return Vec4::W;
+        }
+        let split = optics::split(pixel.direction, surfaces.normal(first), 1.0 / self.optics.ior);
         if split.reflectance > 0.0 {
             let reflected = Ray { direction: split.reflected, inside: false, ..ray };
-            light += split.reflectance * self.follow_part(reflected, (tint, split.reflectance));
+            self.follow_part(reflected, (tint, split.reflectance), pixel);
         }
         if let Some(direction) = split.refracted {
             let part = 1.0 - split.reflectance;
-            light += part * self.follow_part(Ray { direction, ..ray }, (tint, part));
+            self.follow_part(Ray { direction, ..ray }, (tint, part), pixel);
         }
-        light.extend(1.0)
+        Vec4::W
     }
 
     /// What the liquid takes per unit of length behind a surface: of coloured liquid, more of other colours.
@@ -83,54 +94,43 @@ impl<'a> Paths<'a> {
         }
     }
 
-    fn march(&self, ray: &Ray) -> Option<Hit> {
+    fn march(&mut self, ray: &Ray) -> Option<Hit> {
         let (hit, columns) = match self.blocks {
             Some(blocks) => march_blocks((self.surfaces, blocks), ray),
             None => march(self.surfaces, ray),
         };
-        self.work.set(self.work.get() + Work { rays: 1, columns: columns.into() });
+        self.work = self.work + Work { rays: 1, columns: columns.into() };
         hit
     }
 
     /// The light along a path that is a `part` of a pixel's: of a faint one, that of the surroundings.
-    fn follow_part(&self, ray: Ray, (absorption, part): (Vec3, f32)) -> Vec3 {
+    fn follow_part(&mut self, ray: Ray, (absorption, part): (Vec3, f32), pixel: &Pixel) {
         if part < FAINT && !ray.inside {
-            let reach = f32::INFINITY;
             let Ray { origin, direction, .. } = ray;
-            return self.around.background(&Sight {
-                origin,
-                direction,
-                reach,
-                width: 0.0,
-                spread: PART,
-            });
+            let reach = f32::INFINITY;
+            let sight = Sight { origin, direction, reach, width: 0.0, spread: PART };
+            self.look(pixel, sight, Vec3::splat(part));
+        } else {
+            self.follow(ray, (absorption, part), pixel);
         }
-        self.follow(ray, absorption)
     }
 
-    /// The light along a path.
-    fn follow(&self, mut ray: Ray, mut absorption: Vec3) -> Vec3 {
-        let (mut light, mut weight) = (Vec3::ZERO, Vec3::ONE);
+    /// The light along a path, which is a `part` of a pixel's.
+    fn follow(&mut self, mut ray: Ray, (mut absorption, part): (Vec3, f32), pixel: &Pixel) {
+        let mut weight = Vec3::splat(part);
         // Neighbouring paths part at every boundary.
         let (mut width, mut spread) = (0.0, PART);
-        let sight = |origin, direction, width, spread| Sight {
-            origin,
-            direction,
-            reach: f32::INFINITY,
-            width,
-            spread,
-        };
         for boundary in 0..=self.optics.depth {
             let hit = self.march(&ray);
             let reach = hit.map_or(f32::INFINITY, |h| h.distance);
-            let met = self
-                .around
-                .meet(&Sight { reach, ..sight(ray.origin, ray.direction, width, spread) });
+            let Ray { origin, direction, .. } = ray;
+            let sight = Sight { origin, direction, reach, width, spread };
+            let met = self.around.beyond.distance(&sight);
             let Some(hit) = hit.filter(|_| met.is_none()) else {
-                let (seen, distance) = met.unwrap_or((Vec3::ZERO, 0.0));
                 // Where the picture ends, the liquid does.
-                let length = if ray.inside && distance.is_finite() { distance } else { 0.0 };
-                return light + weight * optics::transmitted(absorption, length) * seen;
+                let length = met.filter(|_| ray.inside).unwrap_or(0.0);
+                self.look(pixel, sight, weight * optics::transmitted(absorption, length));
+                return;
             };
             if ray.inside {
                 weight *= optics::transmitted(absorption, hit.distance);
@@ -140,10 +140,11 @@ impl<'a> Paths<'a> {
             let ior = self.optics.ior;
             let eta = if ray.inside { ior } else { 1.0 / ior };
             let split = optics::split(ray.direction, hit.normal, eta);
+            let leaving = Sight { origin: hit.point, width, spread, ..sight };
             if boundary == self.optics.depth {
-                let on = split.refracted.unwrap_or(ray.direction);
-                return light
-                    + weight * self.around.background(&sight(hit.point, on, width, spread));
+                let direction = split.refracted.unwrap_or(ray.direction);
+                self.look(pixel, Sight { direction, ..leaving }, weight);
+                return;
             }
             let (through, thrown) = (split.refracted, split.reflectance);
             let goes_on = through.filter(|_| thrown < 0.5);
@@ -153,10 +154,9 @@ impl<'a> Paths<'a> {
             };
             // The other way, if it is outside.
             let other = if goes_on.is_some() { Some(split.reflected) } else { through };
-            if let Some(other) = other.filter(|_| inside) {
+            if let Some(direction) = other.filter(|_| inside) {
                 let part = if goes_on.is_some() { thrown } else { 1.0 - thrown };
-                let seen = self.around.background(&sight(hit.point, other, width, spread));
-                light += weight * part * seen;
+                self.look(pixel, Sight { direction, ..leaving }, weight * part);
                 weight *= 1.0 - part;
             }
             if inside && !ray.inside {
@@ -164,6 +164,5 @@ impl<'a> Paths<'a> {
             }
             ray = Ray { origin: hit.point, direction, inside, from: Some(hit.surface) };
         }
-        light
     }
 }

@@ -6,8 +6,9 @@
 
 use std::ops::Add;
 
+use fearless_simd::Level;
 use glam::{Vec3, Vec4};
-use motes_scene::{Beyond, Lights, Sight, optics};
+use motes_scene::{Beyond, Lights, Sight};
 use rayon::prelude::*;
 
 use crate::occlusion::Occlusion;
@@ -53,6 +54,8 @@ pub trait Paint: Sync {
 /// What is around the liquid.
 #[derive(Clone, Copy)]
 pub struct Around<'a> {
+    /// What works out the surroundings.
+    pub level: Level,
     /// The lights.
     pub lights: &'a Lights,
     /// What rays meet outside.
@@ -78,21 +81,42 @@ impl Around<'_> {
             _ => self.color,
         }
     }
+}
 
-    /// What comes from outside along a ray, in shadow where the liquid casts one.
-    pub(crate) fn meet(&self, sight: &Sight) -> Option<(Vec3, f32)> {
-        let (light, distance) = self.beyond.meet(sight)?;
-        let lit = match self.shadow.filter(|_| distance.is_finite()) {
-            Some(shadow) => shadow.fill_and_key(sight.origin + sight.direction * distance),
-            None => Vec3::ONE,
-        };
-        Some((light * lit, distance))
+/// Rays that leave the liquid and what they are of which pixel: what they meet is looked up for many at once.
+#[derive(Debug, Default)]
+pub(crate) struct Later {
+    sights: Vec<Sight>,
+    parts: Vec<(u32, Vec3)>,
+    seen: Vec<(Vec3, f32)>,
+}
+
+/// Rays that are looked up at once.
+const TOGETHER: usize = 1 << 8;
+
+impl Later {
+    /// The light that a ray meets outside, `part` of it, goes to pixel number `to` of the row.
+    pub fn add(&mut self, sight: Sight, (to, part): (u32, Vec3)) {
+        self.sights.push(sight);
+        self.parts.push((to, part));
     }
 
-    /// The light from the surroundings, wherever they are.
-    pub(crate) fn background(&self, sight: &Sight) -> Vec3 {
-        let whole = Sight { reach: f32::INFINITY, ..*sight };
-        self.meet(&whole).map_or(Vec3::ZERO, |(light, _)| light)
+    /// Adds what is met to a row of pixels, in shadow where the liquid casts one.
+    fn settle(&mut self, around: &Around<'_>, row: &mut [[f32; 4]]) {
+        self.seen.clear();
+        around.beyond.look(around.level, &self.sights, &mut self.seen);
+        for ((sight, (to, part)), (light, distance)) in
+            self.sights.drain(..).zip(self.parts.drain(..)).zip(&self.seen)
+        {
+            let lit = match around.shadow.filter(|_| distance.is_finite()) {
+                Some(shadow) => shadow.fill_and_key(sight.origin + sight.direction * *distance),
+                None => Vec3::ONE,
+            };
+            let light = part * *light * lit;
+            let pixel = &mut row[to as usize];
+            (pixel[0], pixel[1], pixel[2]) =
+                (pixel[0] + light.x, pixel[1] + light.y, pixel[2] + light.z);
+        }
     }
 }
 
@@ -129,68 +153,112 @@ pub fn shade_finer(
     let finer = finer.max(1) as usize;
     let [width, height] =
         [surfaces.view.size.0 as usize / finer, surfaces.view.size.1 as usize / finer];
-    let blocks = (optics.mode == Mode::Refractive && optics.skip).then(|| Blocks::new(surfaces));
+    let blocks = (optics.mode == Mode::Refractive && optics.skip)
+        .then(|| Blocks::new(around.level, surfaces));
     let paths = || Paths::new(surfaces, (optics, around), blocks.as_ref());
+    let all = |color: &mut [[f32; 4]], each: &Each<'_>| {
+        let bands = color.par_chunks_mut((SQUARE * width).max(1)).enumerate().map(|(y, band)| {
+            let mut paths = paths();
+            for (x, y) in in_squares([width, height], y * SQUARE) {
+                each([x, y], &mut paths, band);
+            }
+            paths.finish(band)
+        });
+        bands.reduce(Work::default, Work::add)
+    };
     let mut first = vec![[0.0; 4]; width * height];
-    let rows = first.par_chunks_mut(width.max(1)).enumerate().map(|(y, row)| {
-        let paths = paths();
-        for (x, color) in row.iter_mut().enumerate() {
-            *color = color_of([x * finer, y * finer], &paths);
-        }
-        paths.work.get()
+    let work = all(&mut first, &|[x, y], paths, band| {
+        paths.add([x * finer, y * finer], (y % SQUARE * width + x, 1.0), band);
     });
-    let work = rows.reduce(Work::default, Work::add);
     if finer == 1 {
         return (first, work);
     }
     let mut color = first.clone();
-    let rows = color.par_chunks_mut(width.max(1)).enumerate().map(|(y, row)| {
-        let paths = paths();
-        for (x, color) in row.iter_mut().enumerate() {
-            let xs = x.saturating_sub(1)..(x + 2).min(width);
-            let mut near = (y.saturating_sub(1)..(y + 2).min(height))
-                .flat_map(|y| xs.clone().map(move |x| y * width + x));
-            if near.any(|i| differ(first[i], *color)) {
-                *color = mean([x, y], (*color, finer), &paths);
+    let share = 1.0 / (finer * finer) as f32;
+    let finer_work = all(&mut color, &|[x, y], paths, band| {
+        let xs = x.saturating_sub(1)..(x + 2).min(width);
+        let mut near = (y.saturating_sub(1)..(y + 2).min(height))
+            .flat_map(|y| xs.clone().map(move |x| y * width + x));
+        let own = first[y * width + x];
+        if near.any(|i| differ(first[i], own)) {
+            let to = y % SQUARE * width + x;
+            band[to] = own.map(|c| c * share);
+            for i in 1..finer * finer {
+                let place = [x * finer + i % finer, y * finer + i / finer];
+                paths.add(place, (to, share), band);
             }
         }
-        paths.work.get()
     });
-    let finer_work = rows.reduce(Work::default, Work::add);
     (color, work + finer_work)
 }
 
-/// The mean of `finer`² pixels, of which the first has the colour `first`.
-fn mean([x, y]: [usize; 2], (first, finer): ([f32; 4], usize), paths: &Paths<'_>) -> [f32; 4] {
-    let mut sum = Vec4::from_array(first);
-    for i in 1..finer * finer {
-        let place = [x * finer + i % finer, y * finer + i / finer];
-        sum += Vec4::from_array(color_of(place, paths));
+/// What is done for a pixel: with its place in the picture, and the band of rows that it is in.
+type Each<'a> = dyn Fn([usize; 2], &mut Paths<'_>, &mut [[f32; 4]]) + Sync + 'a;
+
+/// Pixels along the edge of the squares that are gone through one after the other, so that what rays come by
+/// stays in cache.
+const SQUARE: usize = 32;
+
+/// The pixels of a picture from row `first` on, in squares side by side.
+fn in_squares([width, height]: [usize; 2], first: usize) -> impl Iterator<Item = (usize, usize)> {
+    let rows = first..(first + SQUARE).min(height);
+    (0..width).step_by(SQUARE).flat_map(move |left| {
+        let columns = left..(left + SQUARE).min(width);
+        rows.clone().flat_map(move |y| columns.clone().map(move |x| (x, y)))
+    })
+}
+
+impl Paths<'_> {
+    /// Adds the light of the pixel (x, y) of the surfaces' view, `share` of it, to pixel number `to` of a row.
+    fn add(&mut self, place: [usize; 2], (to, share): (usize, f32), row: &mut [[f32; 4]]) {
+        let surfaces = self.surfaces;
+        let [x, y] = place;
+        let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
+        let spread = surfaces.view.rays.pixel;
+        let index = y * surfaces.view.size.0 as usize + x;
+        let stop = f32::INFINITY;
+        let mut pixel =
+            Pixel { index, place, origin, direction, spread, stop, to: to as u32, share };
+        if self.around.beyond.is_amid() {
+            let met = self.around.beyond.distance(&pixel.sight());
+            pixel.stop = met.unwrap_or(stop) * direction.dot(surfaces.view.rays.forward);
+        }
+        let light = match (surfaces.of(index).is_empty(), self.optics.mode) {
+            (true, _) => self.nothing(&pixel),
+            // What stands before the liquid.
+            _ if pixel.stop <= surfaces.depth(surfaces.of(index).start) => {
+                self.look(&pixel, pixel.sight(), Vec3::ONE);
+                Vec4::W
+            }
+            (_, Mode::Translucent) => {
+                self.waiting.push(pixel);
+                Vec4::ZERO
+            }
+            (_, Mode::Front) => front(surfaces, &pixel, self.around),
+            (_, Mode::Refractive) => self.pixel(&pixel),
+        };
+        row[to] = (Vec4::from_array(row[to]) + light * share).to_array();
+        if self.waiting.len() + self.later.sights.len() >= TOGETHER {
+            self.settle(row);
+        }
     }
-    (sum / (finer * finer) as f32).to_array()
+
+    fn settle(&mut self, row: &mut [[f32; 4]]) {
+        self.translucent(row);
+        self.later.settle(self.around, row);
+    }
+
+    /// Adds to a row what is still to be looked up.
+    fn finish(&mut self, row: &mut [[f32; 4]]) -> Work {
+        self.settle(row);
+        self.work
+    }
 }
 
 /// Whether two colours differ to the eye, whose scale is nearly that of square roots.
 fn differ(a: [f32; 4], b: [f32; 4]) -> bool {
     const SEEN: f32 = 0.03;
     (0..4).any(|i| (a[i].clamp(0.0, 1.0).sqrt() - b[i].clamp(0.0, 1.0).sqrt()).abs() > SEEN)
-}
-
-/// The colour of the pixel (x, y) of the surfaces' view.
-fn color_of(place: [usize; 2], paths: &Paths<'_>) -> [f32; 4] {
-    let Paths { surfaces, optics, around, .. } = *paths;
-    let [x, y] = place;
-    let (origin, direction) = surfaces.view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
-    let spread = surfaces.view.rays.pixel;
-    let index = y * surfaces.view.size.0 as usize + x;
-    let pixel = Pixel { index, place, origin, direction, spread };
-    match (surfaces.of(index).is_empty(), optics.mode) {
-        (true, _) => nothing(&pixel, around),
-        (_, Mode::Front) => front(surfaces, &pixel, around),
-        (_, Mode::Translucent) => translucent(surfaces, &pixel, (optics, around)),
-        (_, Mode::Refractive) => paths.pixel(&pixel),
-    }
-    .to_array()
 }
 
 /// A pixel and its ray.
@@ -201,6 +269,11 @@ pub(crate) struct Pixel {
     pub direction: Vec3,
     /// Size of a pixel: at distance 1 in perspective, which serves for orthographic projection, too.
     pub spread: f32,
+    /// Depth of what stands before the liquid or in it.
+    pub stop: f32,
+    /// Where in its row its light goes, and what share of it.
+    pub to: u32,
+    pub share: f32,
 }
 
 impl Pixel {
@@ -211,83 +284,44 @@ impl Pixel {
     }
 }
 
-fn nothing(pixel: &Pixel, around: &Around<'_>) -> Vec4 {
-    match around.shown {
-        true => around.background(&pixel.sight()).extend(1.0),
-        // The floor and other things are not the background.
-        false => Vec4::ZERO,
+impl Paths<'_> {
+    /// Of what a ray meets outside, `part` goes to a pixel.
+    pub(crate) fn look(&mut self, pixel: &Pixel, sight: Sight, part: Vec3) {
+        self.later.add(sight, (pixel.to, part * pixel.share));
+    }
+
+    fn nothing(&mut self, pixel: &Pixel) -> Vec4 {
+        if !self.around.shown && pixel.stop == f32::INFINITY {
+            // The floor is not the background.
+            return Vec4::ZERO;
+        }
+        self.look(pixel, pixel.sight(), Vec3::ONE);
+        Vec4::W
     }
 }
 
-/// The light of a surface of colour `color`, as if it were opaque.
-fn lit(surfaces: &Surfaces, (pixel, surface): (&Pixel, usize), around: &Around<'_>) -> Vec3 {
-    let (normal, lights) = (surfaces.normal(surface), around.lights);
+/// The part of the key light that falls onto a surface.
+pub(crate) fn key_on(
+    surfaces: &Surfaces,
+    (pixel, surface): (&Pixel, usize),
+    around: &Around<'_>,
+) -> f32 {
+    let normal = surfaces.normal(surface);
     let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
     let point = surfaces.view.point([x, y], surfaces.nearness[surface]);
-    let key = lights.key.seen_from(point);
-    let cos = normal.dot(key.direction).max(0.0);
-    let reached = match around.shadow {
-        Some(shadow) if cos > 0.0 => shadow.reached(point, normal),
-        _ => 1.0,
-    };
-    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, surface)));
-    lights.key.color * (cos * reached) + lights.fill(normal) * open + lights.ambient
-}
-
-/// What the first surface mirrors, and how much of it.
-fn mirrored(
-    surfaces: &Surfaces,
-    pixel: &Pixel,
-    (optics, around): (&Optics, &Around<'_>),
-) -> (Vec3, f32) {
-    let first = surfaces.of(pixel.index).start;
-    let normal = surfaces.normal(first);
-    let split = optics::split(pixel.direction, normal, 1.0 / optics.ior);
-    let [x, y] = pixel.place.map(|i| i as f32 + 0.5);
-    let point = surfaces.view.point([x, y], surfaces.nearness[first]);
-    let sight = Sight { origin: point, direction: split.reflected, ..pixel.sight() };
-    (around.background(&sight), split.reflectance)
+    let cos = normal.dot(around.lights.key.seen_from(point).direction).max(0.0);
+    match around.shadow {
+        Some(shadow) if cos > 0.0 => cos * shadow.reached(point, normal),
+        _ => cos,
+    }
 }
 
 fn front(surfaces: &Surfaces, pixel: &Pixel, around: &Around<'_>) -> Vec4 {
     let first = surfaces.of(pixel.index).start;
     let color = around.color_of(surfaces, first);
-    (color * lit(surfaces, (pixel, first), around)).extend(1.0)
-}
-
-fn translucent(
-    surfaces: &Surfaces,
-    pixel: &Pixel,
-    (optics, around): (&Optics, &Around<'_>),
-) -> Vec4 {
-    let of = surfaces.of(pixel.index);
-    let per_depth = 1.0 / pixel.direction.dot(surfaces.view.rays.forward);
-    let (mut light, mut left) = (Vec3::ZERO, Vec3::ONE);
-    let first = of.start;
-    let extinction = optics.absorption + optics.scattering;
-    for entry in of.clone().step_by(2) {
-        let mut length = surfaces.depth(entry + 1) - surfaces.depth(entry);
-        if entry + 2 == of.end {
-            length -= surfaces.empty(pixel.index);
-        }
-        let through = optics::transmitted(extinction, length.max(0.0) * per_depth);
-        let albedo = optics.scattering / extinction.max(Vec3::splat(f32::MIN_POSITIVE));
-        let color = around.color_of(surfaces, entry);
-        let scattered = albedo * color * lit(surfaces, (pixel, entry), around);
-        light += left * (Vec3::ONE - through) * scattered;
-        left *= through;
-    }
-    let (mirror, reflectance) = mirrored(surfaces, pixel, (optics, around));
-    // An eye inside sees no mirror.
-    let reflectance = if surfaces.depth(first) > surfaces.view.near { reflectance } else { 0.0 };
-    let mut color = light * (1.0 - reflectance) + mirror * reflectance;
-    let mut alpha = 1.0;
-    match around.shown {
-        true => {
-            let beyond = around.background(&pixel.sight());
-            color += left * (1.0 - reflectance) * beyond;
-        }
-        false => alpha = 1.0 - left.element_sum() / 3.0 * (1.0 - reflectance),
-    }
-    color.extend(alpha)
+    let lights = around.lights;
+    let key = key_on(surfaces, (pixel, first), around);
+    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, first)));
+    let fill = lights.fill(surfaces.normal(first)) * open;
+    (color * (lights.key.color * key + fill + lights.ambient)).extend(1.0)
 }

@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
+use fearless_simd::Level;
 use glam::Vec3;
 use motes_scene::Projection;
 
 use crate::connect::{Links, connect};
 use crate::filter::{self, Scale};
 use crate::normals::{normals, unpack};
-use crate::{Extended, Spans, View, flow};
+use crate::{Extended, Spans, View, flow, recursion};
 
 /// The ends of all spans, smoothed, with normals: all that pictures are made from.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +42,7 @@ pub struct Smoothing {
 /// A way to smooth surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// As [`filter::smooth`] does.
+    /// As [`recursion::smooth`] does.
     Recursive,
     /// As [`flow::iterate`] does, at most so many times.
     Iterated(u32),
@@ -54,13 +55,18 @@ impl Smoothing {
     pub const NONE: Self = Self { radius: 0.0, drop: 0.0, filter: Filter::Recursive };
 
     /// Smooths the [`filter::nearness`] of each surface.
-    pub fn apply(self, nearness: &mut Vec<f32>, net: (&Spans, &[Links]), view: &View) {
+    pub fn apply(
+        self,
+        nearness: &mut Vec<f32>,
+        net: (&Spans, &[Links]),
+        (view, level): (&View, Level),
+    ) {
         if self.radius <= 0.0 {
             return;
         }
         let scale = Scale::new(self.radius, self.drop, view);
         match self.filter {
-            Filter::Recursive => filter::smooth(nearness, net, &scale),
+            Filter::Recursive => recursion::smooth(nearness, net, &scale, level),
             Filter::Iterated(most) => flow::iterate(nearness, net, (&scale, most)),
             Filter::Curvature(most) => flow::curvature(nearness, net, (&scale, most), view),
         }
@@ -69,11 +75,11 @@ impl Smoothing {
 
 impl Surfaces {
     /// Connects, smooths and finds the normals of `spans`, which `view` shows.
-    pub fn new(spans: Spans, view: View, smoothing: Smoothing) -> Self {
-        let links = connect(&spans);
+    pub fn new(spans: Spans, view: View, smoothing: Smoothing, level: Level) -> Self {
+        let links = connect(&spans, level);
         let mut nearness = filter::nearness(&spans, view.rays.projection);
-        smoothing.apply(&mut nearness, (&spans, &links), &view);
-        let normals = normals(&nearness, (&spans, &links), &view);
+        smoothing.apply(&mut nearness, (&spans, &links), (&view, level));
+        let normals = normals(&nearness, (&spans, &links), &view, level);
         Self::of_spans(spans, view, (nearness, normals))
     }
 
@@ -131,6 +137,15 @@ impl Surfaces {
 }
 
 impl View {
+    /// The nearness of a depth.
+    #[inline]
+    pub fn nearness(&self, depth: f32) -> f32 {
+        match self.rays.projection {
+            Projection::Perspective => 1.0 / depth,
+            Projection::Orthographic => -depth,
+        }
+    }
+
     /// The point at a place of the picture and a nearness.
     #[inline]
     pub fn point(&self, [x, y]: [f32; 2], nearness: f32) -> Vec3 {

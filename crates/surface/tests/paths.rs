@@ -1,5 +1,6 @@
 //! Rays through the liquid: against the exact ball lens, and with blocks against without.
 
+use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_scene::{Beyond, Lights, Projection, Rays, Scene, Sight, optics};
 use motes_surface::march::{Ray, march, march_blocks};
@@ -67,7 +68,7 @@ fn a_ball_is_a_lens() {
         let view = view((320, 240), projection);
         let ball = [Sphere { center: DVec3::ZERO, radius: 1.2 }];
         let spans = voxelize((&ball, &[]), &view, 0.0, 7);
-        let surfaces = Surfaces::new(spans, view, Smoothing::NONE);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, Level::new());
         let optics = Optics {
             mode: Mode::Refractive,
             ior: WATER,
@@ -78,6 +79,7 @@ fn a_ball_is_a_lens() {
         };
         let lights = lights();
         let around = Around {
+            level: Level::new(),
             lights: &lights,
             beyond: &Hues,
             shown: true,
@@ -120,8 +122,9 @@ fn blocks_change_no_hit() {
     for projection in [Projection::Perspective, Projection::Orthographic] {
         let view = view((203, 149), projection);
         let spans = voxelize((&drops(120), &[]), &view, 0.02, 7);
-        let surfaces = Surfaces::new(spans, view, Smoothing { radius: 0.01, ..Smoothing::NONE });
-        let blocks = Blocks::new(&surfaces);
+        let surfaces =
+            Surfaces::new(spans, view, Smoothing { radius: 0.01, ..Smoothing::NONE }, Level::new());
+        let blocks = Blocks::new(Level::new(), &surfaces);
         let (mut hits, mut plain, mut skipped) = (0, 0, 0);
         for i in 0..40_000_u32 {
             let pixel = (i * 7919) as usize % view.pixels();
@@ -154,7 +157,68 @@ fn thickness_is_what_the_ray_passes() {
     let balls =
         [2.0, 5.0, 8.0].map(|z| Sphere { center: DVec3::new(0.0, 0.0, z - 5.0), radius: 1.0 });
     // Two spans are stored of three; the last counts without what is empty in it.
-    let surfaces = Surfaces::new(voxelize((&balls, &[]), &view, 0.1, 2), view, Smoothing::NONE);
+    let surfaces =
+        Surfaces::new(voxelize((&balls, &[]), &view, 0.1, 2), view, Smoothing::NONE, Level::new());
     let middle = 24 * 64 + 32;
     assert!((surfaces.thickness(middle) - 6.0).abs() < 0.02, "{}", surfaces.thickness(middle));
+}
+
+#[test]
+fn translucent_pixels_are_what_one_works_out_for_each() {
+    let lights = lights();
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        let view = view((101, 77), projection);
+        let spans = voxelize((&drops(40), &[]), &view, 0.0, 2);
+        let surfaces = Surfaces::new(spans, view, Smoothing::NONE, Level::new());
+        let optics = Optics {
+            mode: Mode::Translucent,
+            ior: WATER,
+            absorption: Vec3::new(1.0, 0.4, 0.1),
+            scattering: Vec3::new(0.1, 0.3, 0.2),
+            depth: 2,
+            skip: true,
+        };
+        let color = Vec3::new(0.2, 0.4, 0.9);
+        let around = Around {
+            level: Level::new(),
+            lights: &lights,
+            beyond: &Hues,
+            shown: true,
+            shadow: None,
+            occlusion: None,
+            paint: None,
+            color,
+        };
+        let picture = shade(&surfaces, &optics, &around);
+        let mut most = 0;
+        for (i, found) in picture.iter().enumerate() {
+            let [x, y] = [i % 101, i / 101].map(|i| i as f32 + 0.5);
+            let (_, direction) = view.rays.ray(x, y);
+            let of = surfaces.of(i);
+            most = most.max(of.len());
+            let (mut light, mut left) = (Vec3::ZERO, Vec3::ONE);
+            for entry in of.clone().step_by(2) {
+                let last = if entry + 2 == of.end { surfaces.empty(i) } else { 0.0 };
+                let depth = surfaces.depth(entry + 1) - surfaces.depth(entry) - last;
+                let length = depth.max(0.0) / direction.dot(view.rays.forward);
+                let extinction = optics.absorption + optics.scattering;
+                let through = optics::transmitted(extinction, length);
+                let normal = surfaces.normal(entry);
+                let key = lights.key.color * normal.dot(lights.key.direction).max(0.0);
+                let lit = key + lights.fill(normal) + lights.ambient;
+                let scattered = optics.scattering / extinction * color * lit;
+                light += left * (Vec3::ONE - through) * scattered;
+                left *= through;
+            }
+            let mut expected = light + left * Hues::light(direction);
+            if !of.is_empty() {
+                let split = optics::split(direction, surfaces.normal(of.start), 1.0 / WATER);
+                expected = expected.lerp(Hues::light(split.reflected), split.reflectance);
+            }
+            let error = (Vec3::new(found[0], found[1], found[2]) - expected).abs().max_element();
+            // Depths near 5 are good to 1e-6, lengths and light to some of these.
+            assert!(error < 5e-5 && found[3] == 1.0, "{i}: {found:?} {expected}");
+        }
+        assert!(most == 4, "{most}");
+    }
 }

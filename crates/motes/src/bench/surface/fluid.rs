@@ -98,6 +98,7 @@ impl Fluid {
             bounds: Some(self.bounds),
             origin: DVec3::from_array(self.particles.origin),
             level: Level::new(),
+            others: None,
         }
     }
 
