@@ -49,6 +49,17 @@ pub enum Seen<'a> {
     Mixed(&'a [u64]),
 }
 
+impl Seen<'_> {
+    /// Whether the block's `i`-th particle is seen.
+    pub fn shows(self, i: usize) -> bool {
+        match self {
+            Self::Hidden => false,
+            Self::Shown => true,
+            Self::Mixed(words) => words[i / 64] >> (i % 64) & 1 == 1,
+        }
+    }
+}
+
 /// What is seen of one grid.
 #[derive(Clone, Debug)]
 pub struct Visibility {

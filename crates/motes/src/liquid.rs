@@ -7,12 +7,13 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
+use motes_grid::Visibility;
 use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Beyond, Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
 use motes_surface::{
-    Around, Bits, Boundary, Cull, Filter, Input, Marks, Mode, Occlusion, Optics, Paint, Params,
-    Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress, connect,
-    filter, normals, shade_finer, splat, voxelize,
+    Around, Bits, Boundary, Cull, Filter, Input, Marks, Medium, Mode, Occlusion, Optics, Paint,
+    Params, Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress,
+    connect, filter, normals, shade_finer, splat, voxelize,
 };
 
 use crate::Result;
@@ -65,6 +66,14 @@ impl<'a> Matter<'a> {
     }
 }
 
+impl<'a> Matter<'a> {
+    /// The same of fewer particles of its system.
+    pub fn only(self, system: &'a Loaded, visible: &'a [Visibility]) -> Self {
+        let particles = Particles::Grids(&system.classes.grids, visible);
+        Self { particles, visible: visible.iter().map(Visibility::visible).sum(), ..self }
+    }
+}
+
 /// What is around a liquid, and what it casts on it.
 pub(crate) struct Setting {
     environment: Environment,
@@ -77,6 +86,8 @@ pub(crate) struct Setting {
 pub(crate) struct Liquid<'a> {
     pub scene: &'a Scene,
     pub matter: Matter<'a>,
+    /// The liquids that it is of, if several, with their places among all types.
+    pub media: &'a [(usize, Matter<'a>)],
     pub resolved: &'a Resolved,
     /// All that is visible, in world coordinates.
     pub bounds: Option<Bounds>,
@@ -104,18 +115,31 @@ impl Liquid<'_> {
         let optics = self.optics(bounds);
         let setting = self.setting(bounds, (&boundary, &optics), stats)?;
         let view = self.view(bounds, finer);
-        let surfaces = self.surfaces((&boundary, &params), view, stats);
-        let color = self.shade(&surfaces, (&optics, &setting), stats);
+        let mut media = Vec::new();
+        for (kind, matter) in self.media {
+            let ior = self.scene.surface.iors.get(*kind).map_or(self.ior(), |ior| *ior as f32);
+            let boundary = Liquid { matter: *matter, ..*self }.boundary(&params, stats);
+            media.push((self.surfaces((&boundary, &params), view, stats), ior));
+        }
+        if media.is_empty() {
+            media.push((self.surfaces((&boundary, &params), view, stats), self.ior()));
+        }
+        let color = self.shade(&media, (&optics, &setting), stats);
         let frame = Frame::new(size.0 as usize, size.1 as usize, color)?;
         if !layers {
             return Ok(frame);
         }
-        // A pixel's own ray is through its centre.
-        let centers = match finer {
-            1 => surfaces,
+        // Of the whole liquid, along a pixel's own ray, which is through its centre.
+        let centers = match (&mut media[..], finer) {
+            ([_], 1) => media.remove(0).0,
             _ => self.surfaces((&boundary, &params), self.view(bounds, 1), &mut Stats::default()),
         };
         with_layers(frame, &centers, self.matter.system)
+    }
+
+    /// Index of refraction.
+    pub fn ior(&self) -> f32 {
+        self.scene.surface.ior as f32
     }
 
     /// Samples along a pixel's edge.
@@ -154,10 +178,10 @@ impl Liquid<'_> {
         Ok(Setting { environment, lights, shadow })
     }
 
-    /// The picture of surfaces, of which [`Self::finer`]² make a pixel.
+    /// The picture of the surfaces of each liquid, with their indices of refraction; [`Self::finer`]² make a pixel.
     pub fn shade(
         &self,
-        surfaces: &Surfaces,
+        media: &[(Surfaces, f32)],
         (optics, setting): (&Optics, &Setting),
         stats: &mut Stats,
     ) -> Vec<[f32; 4]> {
@@ -176,7 +200,9 @@ impl Liquid<'_> {
             paint: self.painted().then_some(self as &dyn Paint),
             color: Vec3::from(self.scene.surface.color.linear()),
         };
-        let (color, work) = shade_finer(surfaces, optics, &around, self.finer());
+        let media = media.iter().map(|(surfaces, ior)| Medium { surfaces, ior: *ior });
+        let media: Vec<_> = media.collect();
+        let (color, work) = shade_finer(&media, optics, &around, self.finer());
         let stage = match optics.mode {
             Mode::Front => "front",
             Mode::Translucent => "translucent",
@@ -256,7 +282,6 @@ impl Liquid<'_> {
                 surface::Mode::Translucent => Mode::Translucent,
                 surface::Mode::Refractive => Mode::Refractive,
             },
-            ior: s.ior as f32,
             absorption,
             scattering: Vec3::splat(s.scattering.map_or(absorption.x, |v| v as f32)),
             depth: s.depth,

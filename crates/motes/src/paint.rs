@@ -195,10 +195,10 @@ fn own_color(column: &Column, row: usize, scale: f64) -> Vec3 {
     Vec3::new(channel(0), channel(1), channel(2))
 }
 
-fn category_column<'a>(particles: &'a Particles, of: &[&str]) -> Result<&'a Column> {
+pub(crate) fn category_column<'a>(particles: &'a Particles, of: &[&str]) -> Result<&'a Column> {
     of.iter().find_map(|name| particles.column(name)).ok_or_else(|| {
         let wanted = of.join(" or ");
-        Error::Usage(format!("cannot colour by {wanted}: the particles have no such property"))
+        Error::Usage(format!("the particles have no property {wanted}"))
     })
 }
 
@@ -219,7 +219,7 @@ fn categories(column: &Column, coloring: &Coloring, elements: bool) -> (How, Mea
 
 /// The kind of each particle, counted from 0, and the kinds' names: names in order of appearance,
 /// numbers in ascending order.
-fn kinds_of(column: &Column) -> (Vec<u32>, Vec<String>) {
+pub(crate) fn kinds_of(column: &Column) -> (Vec<u32>, Vec<String>) {
     if let Values::Names { codes, names } = &column.values {
         return (codes.clone(), names.clone());
     }

@@ -11,6 +11,7 @@ use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
 use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
+use motes_surface::MOST_MEDIA;
 
 use crate::annotate::{Annotated, annotations};
 use crate::liquid::{Liquid, Matter};
@@ -360,7 +361,19 @@ impl Session {
         let others = Others { systems: &systems, paint: &paint, bounds: corners };
         let others = (!systems.is_empty()).then_some(others);
         let scene = &self.scene;
-        Liquid { scene, matter, resolved, bounds, origin, level, others }.draw(layers, stats)
+        let types = match scene.surface.media {
+            motes_scene::surface::Media::One => Vec::new(),
+            motes_scene::surface::Media::Types => system.visible_by_type()?,
+        };
+        if types.len() > MOST_MEDIA {
+            return Err(Error::Usage(format!(
+                "surface.media = types: {} types are visible, expected at most {MOST_MEDIA}",
+                types.len()
+            )));
+        }
+        let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
+        let media = &media[..];
+        Liquid { scene, matter, media, resolved, bounds, origin, level, others }.draw(layers, stats)
     }
 
     fn trace(

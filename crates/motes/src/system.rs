@@ -6,12 +6,13 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
 use motes_particles::expression::{Property, Selection, select};
+use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
 use motes_scene::{Bounds, ColorBy, Scene, System};
 use motes_spheres::Spheres;
 
 use crate::annotate::box_shown;
-use crate::paint::{Paint, find_property};
+use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::Rule;
 use crate::{Error, Result, radius};
 
@@ -82,6 +83,33 @@ impl Loaded {
     /// How many particles pass the filters.
     pub fn count_visible(&self) -> usize {
         self.visible.iter().map(Visibility::visible).sum()
+    }
+
+    /// What is visible of each type that has visible particles, by its place among all types.
+    ///
+    /// # Errors
+    /// There are no types.
+    pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
+        let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
+        let mut seen = vec![false; kinds.len()];
+        let grids = self.classes.grids.iter().zip(&self.visible);
+        for (grid, visible) in grids.clone() {
+            for block in 0..grid.blocks.len() - 1 {
+                let of = visible.block(grid, block);
+                for (i, slot) in grid.particles_of(block).enumerate() {
+                    if of.shows(i) {
+                        seen[grid.index(slot) as usize] = true;
+                    }
+                }
+            }
+        }
+        let of_type = |kind: usize| {
+            let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
+            let all = grids.clone().map(|(grid, _)| Visibility::where_all(grid, &[], Some(&keep)));
+            (kind, all.collect::<Vec<_>>())
+        };
+        let all = (0..types.len()).map(of_type);
+        Ok(all.filter(|(_, v)| v.iter().any(|v| v.visible() > 0)).collect())
     }
 
     /// What a tracer of spheres takes.
@@ -173,10 +201,7 @@ fn block_bounds(grid: &Grid, visible: &Visibility, index: usize) -> Option<(Vec3
         _ => grid
             .particles_of(index)
             .enumerate()
-            .filter(|(i, _)| match seen {
-                Seen::Mixed(words) => words[i / 64] >> (i % 64) & 1 == 1,
-                _ => true,
-            })
+            .filter(|(i, _)| seen.shows(*i))
             .map(|(_, slot)| {
                 let (center, radius) = (grid.center(slot), grid.radius_at(slot));
                 (center - radius, center + radius)

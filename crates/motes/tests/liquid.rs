@@ -201,3 +201,68 @@ fn spheres_of_another_system_stand_before_the_liquid_and_in_it() {
         assert!(opaque > 3.0, "{mode}: {opaque}");
     }
 }
+
+/// A box of water with oil above it, one unit each way, from `y = 0` on; and a third type, if asked for.
+fn oil_on_water(assignments: &[&str], name: &str) -> motes::Result<Picture> {
+    let path = std::env::temp_dir().join(format!("motes-{name}-{}.xyz", std::process::id()));
+    let mut text = format!("{}\nProperties=species:S:1:pos:R:3\n", 16 * 16 * 16);
+    for i in 0..16 * 16 * 16 {
+        let [x, y, z] = [i % 16, i / 16 % 16, i / 256].map(|i| f64::from(i) / 16.0);
+        let species = if z < 0.5 { "water" } else { "oil" };
+        text += &format!("{species} {x} {y} {z}\n");
+    }
+    std::fs::write(&path, text).unwrap();
+    let mut scene = Scene::default();
+    scene.set_sources(&[path.display().to_string()]);
+    let common = [
+        "renderer=surface",
+        "image.width=120",
+        "image.height=120",
+        "image.samples=1",
+        "overlay.legend=off",
+        "camera.direction=[0, 1, 0]",
+        "camera.projection=orthographic",
+        "system.0.radius=0.03125",
+        "surface.environment=none",
+        "light.preset=flat",
+        "system.0.color.colors.water=#0000ff",
+        "system.0.color.colors.oil=#ff0000",
+    ];
+    for assignment in common.iter().chain(assignments) {
+        scene.set_text(assignment).unwrap();
+    }
+    let picture =
+        Session::open(scene, Some(2)).and_then(|mut s| s.render(0, Layers::No, &Quiet));
+    std::fs::remove_file(path).unwrap();
+    picture
+}
+
+#[test]
+fn each_type_may_be_a_liquid() {
+    let at = |picture: &Picture, x: usize, y: usize| picture.raw.color()[y * 120 + x];
+    for mode in ["surface.mode=front", "surface.mode=translucent"] {
+        let picture = oil_on_water(&["surface.media=types", mode], "media").unwrap();
+        let [above, below] = [at(&picture, 60, 40), at(&picture, 60, 80)];
+        assert!(above[0] > 2.0 * above[2] && below[2] > 2.0 * below[0], "{above:?} {below:?}");
+    }
+    // A lens of oil bends light more than one of water.
+    let sky = ["surface.environment=sky", "camera.direction=[1, 2, -1]", "surface.media=types"];
+    let refractive = |iors| oil_on_water(&[&sky[..], &[iors]].concat(), "iors").unwrap();
+    let [same, other] =
+        ["surface.iors=[1.33, 1.33]", "surface.iors=[1.33, 1.47]"].map(refractive);
+    let differs = |(a, b): (&[f32; 4], &[f32; 4])| (a[0] - b[0]).abs() > 0.02;
+    let changed =
+        same.raw.color().iter().zip(other.raw.color()).filter(|pair| differs(*pair)).count();
+    assert!(changed > 500, "{changed}");
+}
+
+#[test]
+fn media_need_types() {
+    let mut scene = Scene::default();
+    scene.set_sources(&["demo:dam:1000".into()]);
+    scene.set_text("renderer=surface").unwrap();
+    scene.set_text("surface.media=types").unwrap();
+    let mut session = Session::open(scene, Some(1)).unwrap();
+    let error = session.render(0, Layers::No, &Quiet).unwrap_err();
+    assert!(error.to_string().contains("Particle Type"), "{error}");
+}

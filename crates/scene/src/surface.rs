@@ -44,6 +44,10 @@ settings! {
         tile: u32 = 64,
         /// Index of refraction, over that of what is around.
         ior: f64 = 1.33,
+        /// What is one liquid: one (all particles) or types (the particles of each type, with boundaries between them).
+        media: Media = Media::One,
+        /// Indices of refraction of the types, in the order of the legend, for media = types; of those without, ior.
+        iors: Vec<f64> = Vec::new(),
         /// What the liquid takes of red, green and blue per world unit; none: that of clear water as deep as what is visible is wide.
         absorption: Option<DVec3> = None => "[1.0, 0.4, 0.3]",
         /// What it scatters per world unit, in translucent mode; none: as much as it absorbs of red.
@@ -68,6 +72,16 @@ words! {
         Translucent = "translucent",
         /// Light is bent and mirrored.
         Refractive = "refractive",
+    }
+}
+
+words! {
+    /// What is one liquid.
+    pub enum Media {
+        /// All particles.
+        One = "one",
+        /// The particles of a type.
+        Types = "types",
     }
 }
 
@@ -137,7 +151,10 @@ pub(crate) fn check(surface: &Surface) -> Result<()> {
     )?;
     let fits = (4..=1024).contains(&s.tile) && s.tile.is_multiple_of(4);
     need("surface.tile", s.tile, fits, "a multiple of 4 in 4 to 1024")?;
-    need("surface.ior", s.ior, (0.1..=10.0).contains(&s.ior), "a number in 0.1 to 10")?;
+    let optical = |ior: &f64| (0.1..=10.0).contains(ior);
+    need("surface.ior", s.ior, optical(&s.ior), "a number in 0.1 to 10")?;
+    let all = format!("{:?}", s.iors);
+    need("surface.iors", all, s.iors.iter().all(optical), "numbers in 0.1 to 10")?;
     let fits = s.absorption.is_none_or(|a| a.is_finite() && a.cmpge(DVec3::ZERO).all());
     need("surface.absorption", s.absorption, fits, "three numbers, 0 or more")?;
     need("surface.depth", s.depth, s.depth <= 64, "at most 64")?;

@@ -26,6 +26,7 @@ mod intervals;
 mod items;
 mod layers;
 pub mod march;
+mod media;
 pub mod normals;
 mod occlusion;
 mod params;
@@ -45,6 +46,7 @@ mod voxelize;
 
 pub use blocks::Blocks;
 pub use boundary::{Boundary, BoundaryCounts};
+pub use media::{MOST_MEDIA, Medium};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation, Spray};
 pub use shade::{Around, Mode, Optics, Paint, Work, shade, shade_finer};

@@ -11,20 +11,25 @@ use motes_scene::{Sight, optics};
 use crate::Surfaces;
 use crate::blocks::Blocks;
 use crate::march::{Hit, Ray, march, march_blocks};
+use crate::media::{Medium, Passage};
 use crate::shade::{Around, Later, Optics, Pixel, Work};
 
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
-const PART: f32 = 0.02;
+pub(crate) const PART: f32 = 0.02;
 
 /// Paths that are less than this part of a pixel's light meet nothing but the surroundings.
-const FAINT: f32 = 0.03;
+pub(crate) const FAINT: f32 = 0.03;
 
 /// What paths go through, for one thread.
 pub(crate) struct Paths<'a> {
+    /// All media; there is one at least.
+    pub media: &'a [Passage<'a>],
+    /// Those of the first of them.
     pub surfaces: &'a Surfaces,
+    pub blocks: Option<&'a Blocks>,
+    pub ior: f32,
     pub optics: &'a Optics,
     pub around: &'a Around<'a>,
-    pub blocks: Option<&'a Blocks>,
     /// What was done so far.
     pub work: Work,
     /// What is looked up together.
@@ -34,16 +39,15 @@ pub(crate) struct Paths<'a> {
 }
 
 impl<'a> Paths<'a> {
-    pub fn new(
-        surfaces: &'a Surfaces,
-        (optics, around): (&'a Optics, &'a Around<'a>),
-        blocks: Option<&'a Blocks>,
-    ) -> Self {
+    pub fn new(media: &'a [Passage<'a>], (optics, around): (&'a Optics, &'a Around<'a>)) -> Self {
+        let Medium { surfaces, ior } = media[0].medium;
         Self {
+            media,
             surfaces,
+            blocks: media[0].blocks.as_ref(),
+            ior,
             optics,
             around,
-            blocks,
             work: Work::default(),
             later: Later::default(),
             waiting: Vec::new(),
@@ -70,7 +74,7 @@ impl<'a> Paths<'a> {
             self.follow(ray, (tint, 1.0), pixel);
             return Vec4::W;
         }
-        let split = optics::split(pixel.direction, surfaces.normal(first), 1.0 / self.optics.ior);
+        let split = optics::split(pixel.direction, surfaces.normal(first), 1.0 / self.ior);
         if split.reflectance > 0.0 {
             let reflected = Ray { direction: split.reflected, inside: false, ..ray };
             self.follow_part(reflected, (tint, split.reflectance), pixel);
@@ -84,10 +88,15 @@ impl<'a> Paths<'a> {
 
     /// What the liquid takes per unit of length behind a surface: of coloured liquid, more of other colours.
     fn color(&self, surface: usize) -> Vec3 {
+        self.color_in(0, surface)
+    }
+
+    /// The same of a medium.
+    pub fn color_in(&self, medium: usize, surface: usize) -> Vec3 {
         match self.around.paint {
             None => self.optics.absorption,
             Some(_) => {
-                let color = self.around.color_of(self.surfaces, surface);
+                let color = self.around.color_of(self.media[medium].medium.surfaces, surface);
                 let mean = self.optics.absorption.element_sum() / 3.0;
                 -color.clamp(Vec3::splat(0.02), Vec3::ONE).map(f32::ln) * mean
             }
@@ -137,7 +146,7 @@ impl<'a> Paths<'a> {
             }
             width += spread * hit.distance;
             spread += PART;
-            let ior = self.optics.ior;
+            let ior = self.ior;
             let eta = if ray.inside { ior } else { 1.0 / ior };
             let split = optics::split(ray.direction, hit.normal, eta);
             let leaving = Sight { origin: hit.point, width, spread, ..sight };

@@ -11,6 +11,7 @@ use glam::{Vec3, Vec4};
 use motes_scene::{Beyond, Lights, Sight};
 use rayon::prelude::*;
 
+use crate::media::{MOST_MEDIA, Medium, Passage};
 use crate::occlusion::Occlusion;
 use crate::refract::Paths;
 use crate::shadow::Shadow;
@@ -32,8 +33,6 @@ pub enum Mode {
 pub struct Optics {
     /// How it is shown.
     pub mode: Mode,
-    /// Index of refraction over that of what is around.
-    pub ior: f32,
     /// What is taken from each colour per unit of length.
     pub absorption: Vec3,
     /// The part of light that is not absorbed but scattered, for each colour, per unit of length; in refractive
@@ -138,24 +137,35 @@ impl Add for Work {
 }
 
 /// The picture: linear, premultiplied colours, row by row.
-pub fn shade(surfaces: &Surfaces, optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
-    shade_finer(surfaces, optics, around, 1).0
+///
+/// # Panics
+/// Without media, or with more than [`MOST_MEDIA`].
+pub fn shade(media: &[Medium<'_>], optics: &Optics, around: &Around<'_>) -> Vec<[f32; 4]> {
+    shade_finer(media, optics, around, 1).0
 }
 
 /// A picture of fewer pixels, and what was done for it: each is the mean of `finer`² of the surfaces', or, where
 /// it differs little from all eight around it, the first of them.
+///
+/// # Panics
+/// As [`shade`].
 pub fn shade_finer(
-    surfaces: &Surfaces,
+    media: &[Medium<'_>],
     optics: &Optics,
     around: &Around<'_>,
     finer: u32,
 ) -> (Vec<[f32; 4]>, Work) {
+    assert!((1..=MOST_MEDIA).contains(&media.len()), "{} media", media.len());
     let finer = finer.max(1) as usize;
-    let [width, height] =
-        [surfaces.view.size.0 as usize / finer, surfaces.view.size.1 as usize / finer];
-    let blocks = (optics.mode == Mode::Refractive && optics.skip)
-        .then(|| Blocks::new(around.level, surfaces));
-    let paths = || Paths::new(surfaces, (optics, around), blocks.as_ref());
+    let size = media[0].surfaces.view.size;
+    let [width, height] = [size.0 as usize / finer, size.1 as usize / finer];
+    let skips = optics.mode == Mode::Refractive && optics.skip;
+    let passages = media.iter().map(|medium| Passage {
+        medium: *medium,
+        blocks: skips.then(|| Blocks::new(around.level, medium.surfaces)),
+    });
+    let media: Vec<_> = passages.collect();
+    let paths = || Paths::new(&media, (optics, around));
     let all = |color: &mut [[f32; 4]], each: &Each<'_>| {
         let bands = color.par_chunks_mut((SQUARE * width).max(1)).enumerate().map(|(y, band)| {
             let mut paths = paths();
@@ -223,18 +233,27 @@ impl Paths<'_> {
             let met = self.around.beyond.distance(&pixel.sight());
             pixel.stop = met.unwrap_or(stop) * direction.dot(surfaces.view.rays.forward);
         }
-        let light = match (surfaces.of(index).is_empty(), self.optics.mode) {
-            (true, _) => self.nothing(&pixel),
+        let first = match self.media {
+            [_] => surfaces.of(index).next().map(|first| (0, first)),
+            _ => self.first(index),
+        };
+        let depth = first.map_or(stop, |(m, first)| self.media[m].medium.surfaces.depth(first));
+        let light = match (first, self.optics.mode) {
+            (None, _) => self.nothing(&pixel),
             // What stands before the liquid.
-            _ if pixel.stop <= surfaces.depth(surfaces.of(index).start) => {
+            _ if pixel.stop <= depth => {
                 self.look(&pixel, pixel.sight(), Vec3::ONE);
                 Vec4::W
             }
+            (Some(first), Mode::Front) => self.front(&pixel, first),
+            (_, Mode::Translucent) if self.media.len() > 1 => self.translucent_media(&pixel),
             (_, Mode::Translucent) => {
                 self.waiting.push(pixel);
                 Vec4::ZERO
             }
-            (_, Mode::Front) => front(surfaces, &pixel, self.around),
+            (Some(first), Mode::Refractive) if self.media.len() > 1 => {
+                self.refractive_media(&pixel, first)
+            }
             (_, Mode::Refractive) => self.pixel(&pixel),
         };
         row[to] = (Vec4::from_array(row[to]) + light * share).to_array();
@@ -298,6 +317,11 @@ impl Paths<'_> {
         self.look(pixel, pixel.sight(), Vec3::ONE);
         Vec4::W
     }
+
+    fn front(&self, pixel: &Pixel, (m, first): (usize, usize)) -> Vec4 {
+        let color = self.around.color_of(self.media[m].medium.surfaces, first);
+        (color * self.falling((m, first), pixel)).extend(1.0)
+    }
 }
 
 /// The part of the key light that falls onto a surface.
@@ -314,14 +338,4 @@ pub(crate) fn key_on(
         Some(shadow) if cos > 0.0 => cos * shadow.reached(point, normal),
         _ => cos,
     }
-}
-
-fn front(surfaces: &Surfaces, pixel: &Pixel, around: &Around<'_>) -> Vec4 {
-    let first = surfaces.of(pixel.index).start;
-    let color = around.color_of(surfaces, first);
-    let lights = around.lights;
-    let key = key_on(surfaces, (pixel, first), around);
-    let open = around.occlusion.map_or(1.0, |o| o.open(surfaces, (pixel.place, first)));
-    let fill = lights.fill(surfaces.normal(first)) * open;
-    (color * (lights.key.color * key + fill + lights.ambient)).extend(1.0)
 }

@@ -132,7 +132,7 @@ fn is_own(around: &Around<'_>) -> bool {
 
 #[simd]
 fn see<S: Simd>(simd: S, paths: &Paths<'_>, pixels: &[Pixel]) -> Seen {
-    let Paths { surfaces, optics, around, .. } = paths;
+    let Paths { surfaces, optics, around, ior, .. } = paths;
     let lights = around.lights;
     let [zero, one] = [f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0)];
     let mut way = [[0.0; LANES]; 3];
@@ -182,7 +182,7 @@ fn see<S: Simd>(simd: S, paths: &Paths<'_>, pixels: &[Pixel]) -> Seen {
             left[c] = left[c] * through;
         }
     }
-    let (mirrored, reflectance) = mirror(simd, (way, first), 1.0 / optics.ior);
+    let (mirrored, reflectance) = mirror(simd, (way, first), 1.0 / ior);
     let mut seen = Seen {
         light: [[0.0; LANES]; 3],
         left: [[0.0; LANES]; 3],

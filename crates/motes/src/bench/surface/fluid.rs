@@ -94,6 +94,7 @@ impl Fluid {
         Liquid {
             scene,
             matter,
+            media: &[],
             resolved,
             bounds: Some(self.bounds),
             origin: DVec3::from_array(self.particles.origin),
@@ -125,7 +126,7 @@ impl Fluid {
         let (boundary, mut stats) = (&extracted.boundary, extracted.stats.clone());
         let params = liquid.params(liquid.painted());
         let view = liquid.view(self.bounds, liquid.finer());
-        let shade = |surfaces: &Surfaces, mode: Mode, stats: &mut Stats| {
+        let shade = |surfaces: &[(Surfaces, f32)], mode: Mode, stats: &mut Stats| {
             let optics = Optics { mode, ..liquid.optics(self.bounds) };
             let setting = liquid.setting(self.bounds, (boundary, &optics), stats)?;
             Ok::<_, Error>(liquid.shade(surfaces, (&optics, &setting), stats))
@@ -137,6 +138,7 @@ impl Fluid {
         };
         let (ms, frame) = timed(|| {
             let surfaces = liquid.surfaces((boundary, &params), view, &mut stats);
+            let surfaces = [(surfaces, liquid.ior())];
             shade(&surfaces, mode, &mut stats).map(|color| (surfaces, color))
         });
         let (surfaces, color) = frame?;
@@ -145,6 +147,7 @@ impl Fluid {
             hashes.push(hash(&shade(&surfaces, *mode, &mut stats)?));
         }
         stats.ms.insert("frame", ms);
+        let [(surfaces, _)] = surfaces;
         Ok(Drawn { stats, hashes, surfaces, color })
     }
 }
