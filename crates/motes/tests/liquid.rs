@@ -231,8 +231,7 @@ fn oil_on_water(assignments: &[&str], name: &str) -> motes::Result<Picture> {
     for assignment in common.iter().chain(assignments) {
         scene.set_text(assignment).unwrap();
     }
-    let picture =
-        Session::open(scene, Some(2)).and_then(|mut s| s.render(0, Layers::No, &Quiet));
+    let picture = Session::open(scene, Some(2)).and_then(|mut s| s.render(0, Layers::No, &Quiet));
     std::fs::remove_file(path).unwrap();
     picture
 }
@@ -248,8 +247,7 @@ fn each_type_may_be_a_liquid() {
     // A lens of oil bends light more than one of water.
     let sky = ["surface.environment=sky", "camera.direction=[1, 2, -1]", "surface.media=types"];
     let refractive = |iors| oil_on_water(&[&sky[..], &[iors]].concat(), "iors").unwrap();
-    let [same, other] =
-        ["surface.iors=[1.33, 1.33]", "surface.iors=[1.33, 1.47]"].map(refractive);
+    let [same, other] = ["surface.iors=[1.33, 1.33]", "surface.iors=[1.33, 1.47]"].map(refractive);
     let differs = |(a, b): (&[f32; 4], &[f32; 4])| (a[0] - b[0]).abs() > 0.02;
     let changed =
         same.raw.color().iter().zip(other.raw.color()).filter(|pair| differs(*pair)).count();

@@ -53,7 +53,8 @@ impl Scene {
     }
 }
 
-/// What `text` can mean, the first that fits wins: TOML; a list without its brackets; a bare word.
+/// What `text` can mean, the first that fits wins: TOML; a list without its brackets; numbers as people write
+/// them, such as `.5` or `2.`; a bare word.
 fn readings(text: &str) -> Vec<Value> {
     let toml = |text: String| -> Option<Value> {
         let mut table: Table = toml::from_str(&format!("v = {text}")).ok()?;
@@ -62,6 +63,17 @@ fn readings(text: &str) -> Vec<Value> {
     let mut readings: Vec<Value> = toml(text.into()).into_iter().collect();
     if text.contains(',') {
         readings.extend(toml(format!("[{text}]")));
+    }
+    let number = |item: &str| {
+        let plain = item.trim().bytes().all(|b| b"+-.0123456789eE".contains(&b));
+        item.trim().parse().ok().filter(|_| plain).map(Value::Float)
+    };
+    let items = text.trim().trim_start_matches('[').trim_end_matches(']').split(',');
+    let numbers: Option<Vec<_>> = items.map(number).collect();
+    match numbers {
+        Some(mut one) if one.len() == 1 => readings.extend(one.pop()),
+        Some(several) => readings.push(Value::Array(several)),
+        None => {}
     }
     readings.push(Value::String(text.into()));
     readings
@@ -199,6 +211,15 @@ mod tests {
         assert_eq!(scene.system[0].r#where, "x > 1 && y = 2");
         assert_eq!(scene.system[1].filter[0].max, Some(3.0));
         assert_eq!(scene.image.background, Color::hex(0xff0000));
+    }
+
+    #[test]
+    fn numbers_are_read_as_people_write_them() {
+        let scene =
+            with(&["camera.position=.5, -1.,2", "camera.target=[0,.5,1e-1]", "camera.fov=4."]);
+        assert_eq!(scene.camera.position, Some(glam::DVec3::new(0.5, -1.0, 2.0)));
+        assert_eq!(scene.camera.target, Some(glam::DVec3::new(0.0, 0.5, 0.1)));
+        assert_eq!(scene.camera.fov, 4.0);
     }
 
     #[test]
