@@ -1,0 +1,168 @@
+//! The fine field: each particle adds its density to the voxels in its reach.
+//!
+//! Yasuda et al. 2009, §4.2.2–4.2.4. The density of a particle is W(r/R) ([`crate::kernel`]). Where a mask says
+//! that a side is filled, R shrinks towards it,
+//!
+//! > R₊ₓ = R + (R_min − R)·min(P₊ₓ / P_filled, 1),
+//!
+//! and q = Σ (x / R±ₓ)² takes the place of (r/R)²: an eighth of an ellipsoid in each octant. Saturated voxels
+//! are skipped. Without both this is the plain field, every particle into every voxel in its reach, by the
+//! same code.
+
+use fearless_simd::{f32x8, mask32x8, prelude::*};
+use fearless_simd_macros::simd;
+
+use crate::bins::Entry;
+use crate::kernel::amplitude;
+use crate::lattice::{Lattice, reach};
+use crate::params::{Params, Particles};
+use crate::rough::Rough;
+
+/// The mask of a side that is filled at rest.
+const FILLED: f32 = 0.63;
+/// Reach towards a filled side, in voxels: with less, holes open between the voxels of particles.
+const LEAST_REACH: f32 = 1.4;
+/// Voxels in a vector.
+pub(crate) const LANES: usize = 8;
+
+/// What densities are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub particles: Particles<'a>,
+    pub lattice: &'a Lattice,
+    pub params: &'a Params,
+    pub rough: Option<&'a Rough>,
+}
+
+/// A tile's rows, and where they are.
+pub(crate) struct Tile<'a> {
+    /// y fastest.
+    pub rows: Vec<&'a mut [f32]>,
+    /// First row and how many, along y and z.
+    pub y: [usize; 2],
+    pub z: [usize; 2],
+    /// Voxels written.
+    pub updates: u64,
+    /// Particles that were not skipped as a whole.
+    pub visits: u64,
+}
+
+/// The density of one particle, in voxels.
+struct Bump {
+    at: [f32; 3],
+    /// Reach to the lower and to the higher side.
+    reach: [[f32; 2]; 3],
+    amplitude: f32,
+}
+
+impl Source<'_> {
+    #[inline(always)]
+    fn bump<const MASKED: bool>(&self, entry: &Entry) -> Bump {
+        let index = entry.index as usize;
+        let radius = self.particles.radius(index);
+        let far = reach(radius, self.lattice.voxel, self.params) / self.lattice.voxel;
+        let mut bump = Bump {
+            at: entry.at,
+            reach: [[far; 2]; 3],
+            amplitude: amplitude(radius / self.lattice.voxel, far),
+        };
+        if MASKED && let Some(masks) = self.particles.masks {
+            let (mask, least) = (&masks[index], LEAST_REACH.min(far));
+            let side = |side: usize| {
+                let filled = (mask[side] * (1.0 / FILLED)).clamp(0.0, 1.0);
+                far + (least - far) * filled
+            };
+            bump.reach = [[side(1), side(0)], [side(3), side(2)], [side(5), side(4)]];
+        }
+        bump
+    }
+}
+
+/// Adds the densities of particles to a tile.
+#[simd]
+pub(crate) fn add<S: Simd, const MASKED: bool, const COUNTED: bool>(
+    simd: S,
+    source: &Source<'_>,
+    entries: &[Entry],
+    tile: &mut Tile<'_>,
+) {
+    for entry in entries {
+        if let Some(rough) = source.rough
+            && rough.is_core(entry.at)
+        {
+            continue;
+        }
+        tile.visits += 1;
+        let bump = source.bump::<MASKED>(entry);
+        // The first row begins where the density does; what lies before it is met by rounding only.
+        let along = whole(bump.at[0], bump.reach[0], [0, source.lattice.dims[0]]);
+        let mut first = along[0];
+        while first < along[1] {
+            add_columns::<S, MASKED, COUNTED>(simd, source, (&bump, first), tile);
+            first += LANES;
+        }
+    }
+}
+
+/// The whole numbers within reach of a place, from the first to before the last, within limits.
+#[inline(always)]
+fn whole(at: f32, reach: [f32; 2], [from, to]: [usize; 2]) -> [usize; 2] {
+    let first = (at - reach[0]).max(0.0) as usize;
+    let last = (at + reach[1]).max(0.0) as usize + 1;
+    [first.max(from), last.min(to)]
+}
+
+/// Adds a density to [`LANES`] columns of a tile from `first` on.
+#[inline(always)]
+fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
+    simd: S,
+    source: &Source<'_>,
+    (bump, first): (&Bump, usize),
+    tile: &mut Tile<'_>,
+) {
+    let saturation = f32x8::splat(simd, source.params.saturation);
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let count = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    let x = count + (first as f32 - bump.at[0]);
+    let [low, high] = bump.reach[0].map(|r| 1.0 / r);
+    let x = match MASKED {
+        true => x * x.simd_lt(zero).select(f32x8::splat(simd, low), f32x8::splat(simd, high)),
+        false => x * low,
+    };
+    // 1 − q of the columns; q of rows is taken from it.
+    let left = one - x * x;
+    let ys = whole(bump.at[1], bump.reach[1], [tile.y[0], tile.y[0] + tile.y[1]]);
+    let zs = whole(bump.at[2], bump.reach[2], [tile.z[0], tile.z[0] + tile.z[1]]);
+    for z in zs[0]..zs[1] {
+        let qz = part(z, bump.at[2], bump.reach[2]);
+        for y in ys[0]..ys[1] {
+            let q = qz + part(y, bump.at[1], bump.reach[1]);
+            if q >= 1.0 {
+                continue;
+            }
+            let w = (left - q).max(zero);
+            let more = w * w * (w * bump.amplitude);
+            let row = &mut *tile.rows[(z - tile.z[0]) * tile.y[1] + y - tile.y[0]];
+            let Some(voxels) = row.get_mut(first..first + LANES) else { continue };
+            let before = f32x8::from_slice(simd, voxels);
+            let open: mask32x8<S> = before.simd_lt(saturation) & w.simd_gt(zero);
+            let after = match source.rough {
+                Some(_) => open.select((before + more).min(saturation), before),
+                None => before + more,
+            };
+            after.store_slice(voxels);
+            if COUNTED {
+                let written = if source.rough.is_some() { open } else { w.simd_gt(zero) };
+                tile.updates += u64::from(written.to_bitmask().count_ones());
+            }
+        }
+    }
+}
+
+/// The part of q that one axis makes.
+#[inline(always)]
+fn part(voxel: usize, at: f32, reach: [f32; 2]) -> f32 {
+    let d = voxel as f32 - at;
+    let d = d / if d < 0.0 { reach[0] } else { reach[1] };
+    d * d
+}
