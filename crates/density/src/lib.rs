@@ -17,6 +17,7 @@ mod field;
 mod fine;
 mod kernel;
 mod lattice;
+mod layers;
 mod march;
 mod normals;
 mod params;
@@ -30,6 +31,7 @@ mod view;
 
 pub use field::{Counts, Field};
 pub use lattice::Lattice;
+pub use layers::{Seen, layers};
 pub use params::{Mask, Params, Particles};
 pub use shade::{Around, Liquid, Optics, Paint, shade};
 pub use shadow::Shadow;

@@ -98,10 +98,11 @@ impl Caster<'_> {
                 spread,
                 absorption: self.optics.absorption,
             };
+
             let wet = self.field.at(place) >= self.space.threshold;
             desk.now.push(path, (place, direction), if wet { LIQUID } else { OUTSIDE });
         }
-        for boundary in 0..=self.optics.depth {
+        for boundary in 1..=self.optics.depth {
             if desk.now.paths.is_empty() {
                 break;
             }
@@ -145,7 +146,7 @@ impl Caster<'_> {
         let inside = medium != OUTSIDE;
         let length = distance * self.field.lattice.voxel;
         let to = &mut light[path.sample as usize];
-        if number == 0 {
+        if number == 1 {
             to.w += 1.0;
         }
         let reach = if distance.is_finite() { length } else { f32::INFINITY };
@@ -154,7 +155,7 @@ impl Caster<'_> {
         {
             let wet = if inside && to_it.is_finite() { to_it } else { 0.0 };
             let left = path.weight * optics::transmitted(path.absorption, wet);
-            if number == 0 && distance == f32::INFINITY && !self.around.shown {
+            if number == 1 && distance == f32::INFINITY && !self.around.shown {
                 to.w -= 1.0;
             } else {
                 *to += (left * seen).extend(0.0);
@@ -179,7 +180,7 @@ impl Caster<'_> {
         path.spread += PART;
         let met = Boundary { place, normal, surface, inside };
         match number {
-            0 if !inside => self.first(path, direction, &met, (next, to)),
+            1 if !inside && self.optics.depth > 1 => self.first(path, direction, &met, (next, to)),
             _ => self.split(path, direction, (&met, number), (next, to)),
         }
     }

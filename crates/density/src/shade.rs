@@ -23,7 +23,7 @@ pub struct Optics {
     pub ior: f32,
     /// What is taken from each colour per unit of length.
     pub absorption: Vec3,
-    /// Boundaries that a path goes on from.
+    /// Boundaries that a path meets at the most, at least 1.
     pub depth: u32,
 }
 

@@ -3,17 +3,15 @@
 //! A map across the light's way: for each of its pixels, how much liquid light passes on its way through. All
 //! that is lit through it lies below the liquid, as the floor does.
 
-use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::march::{self, Hits, OUTSIDE, Rays};
+use crate::layers::passed;
+use crate::march::{OUTSIDE, Rays};
 use crate::shade::Liquid;
 
 /// Pixels along the edge of the map.
 const SIZE: usize = 192;
-/// Most stretches of liquid that a ray passes.
-const STRETCHES: usize = 16;
 
 /// The liquid as a far light sees it.
 #[derive(Clone, Debug)]
@@ -33,7 +31,7 @@ impl Shadow {
     /// The shadow of a liquid that takes `extinction` per unit of length, away from the unit vector `toward`;
     /// `fill` is the part of the light that comes from elsewhere.
     pub fn new(liquid: &Liquid<'_>, toward: Vec3, (extinction, fill): (f32, f32)) -> Self {
-        let Liquid { field, space, level } = *liquid;
+        let Liquid { field, space, .. } = *liquid;
         let lattice = &field.lattice;
         let [low, high] = space.bounds.map(|corner| lattice.point(corner));
         let center = low.midpoint(high);
@@ -43,33 +41,14 @@ impl Shadow {
         let step = size / SIZE as f32;
         let mut left = vec![1.0; SIZE * SIZE];
         left.par_chunks_mut(SIZE).enumerate().for_each(|(y, row)| {
-            let (mut rays, mut hits) = (Rays::default(), Hits::default());
-            let mut which: Vec<usize> = (0..SIZE).collect();
+            let mut rays = Rays::default();
             for x in 0..SIZE {
                 let [a, b] = [x, y].map(|i| (i as f32 + 0.5) * step - 0.5 * size);
                 let start = center + across[0] * a + across[1] * b + toward * size;
                 rays.push(lattice.place(start), -toward, OUTSIDE);
             }
-            for stretch in 0..2 * STRETCHES {
-                if which.is_empty() {
-                    break;
-                }
-                dispatch!(level, simd => march::march(simd, (field, space), &mut rays, &mut hits));
-                let (mut next, mut going) = (Rays::default(), Vec::new());
-                for (ray, pixel) in which.iter().enumerate() {
-                    let distance = hits.distance[ray];
-                    if distance.is_finite() {
-                        let inside = stretch % 2 == 1;
-                        if inside {
-                            row[*pixel] *= (-extinction * distance * lattice.voxel).exp();
-                        }
-                        let (origin, direction) = (rays.origin(ray), rays.direction(ray));
-                        let medium = if inside { OUTSIDE } else { hits.surface[ray] };
-                        next.push(origin + direction * distance, direction, medium);
-                        going.push(*pixel);
-                    }
-                }
-                (rays, which) = (next, going);
+            for (left, passed) in row.iter_mut().zip(passed(liquid, rays)) {
+                *left = (-extinction * passed).exp();
             }
         });
         Self { center, across, per_length: 1.0 / step, left, fill }

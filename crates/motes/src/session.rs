@@ -14,6 +14,7 @@ use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 
 use crate::annotate::{Annotated, annotations};
+use crate::density::Cast;
 use crate::liquid::{Liquid, Matter};
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
@@ -199,6 +200,10 @@ impl Session {
             ));
         }
 
+        if self.scene.renderer == Renderer::Density && loaded.len() > 1 {
+            self.notes
+                .push("renderer density: the first system is drawn, the others are not".into());
+        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
@@ -212,6 +217,10 @@ impl Session {
             Renderer::Surface => {
                 let bounds = boxes.iter().copied().reduce(Bounds::union);
                 self.flow(&loaded, (&resolved, origin, bounds), layers, &mut stats)?
+            }
+            Renderer::Density => {
+                let bounds = boxes.iter().copied().reduce(Bounds::union);
+                self.cast(&loaded, (&resolved, origin, bounds), layers, (&mut stats, watch))?
             }
         };
         stats.ms.insert("trace", milliseconds(start));
@@ -324,7 +333,11 @@ impl Session {
             // Beside a series, what has one frame stands still.
             let still = own > 0 && self.series.len() > 1 && self.series[i].frames(&report)? == 1;
             let own = if still { 0 } else { own };
-            let wanted = wanted(system);
+            let mut wanted = wanted(system);
+            let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
+            if masked && let Wanted::Only(columns) = &mut wanted {
+                columns.push(names::PARTICLE_MASK.into());
+            }
             if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
                 self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
             }
@@ -374,6 +387,23 @@ impl Session {
         let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
         let media = &media[..];
         Liquid { scene, matter, media, resolved, bounds, origin, level, others }.draw(layers, stats)
+    }
+
+    /// The first system as a liquid, by a field of voxels.
+    fn cast(
+        &self,
+        loaded: &[Loaded],
+        (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
+        layers: bool,
+        (stats, watch): (&mut Stats, &dyn Watch),
+    ) -> Result<Frame> {
+        let [system, ..] = loaded else {
+            return Err(Error::Usage("renderer density: no system is visible".into()));
+        };
+        let level = Level::new();
+        stats.simd = instruction_set(level).into();
+        Cast { scene: &self.scene, system, resolved, bounds, origin, level }
+            .draw(layers, (stats, watch))
     }
 
     fn trace(

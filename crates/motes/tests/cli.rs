@@ -338,7 +338,7 @@ fn bad_usage_names_the_nearest_word() {
     for (args, part) in [
         (&["rendr"][..], "'render'"),
         (&["render", demo, "-o", "a.png", "--colr-by", "x"], "'--color-by'"),
-        (&["render", demo, "-o", "a.png", "--renderer", "sphere"], "spheres, surface"),
+        (&["render", demo, "-o", "a.png", "--renderer", "sphere"], "spheres, surface, density"),
         (&["render", demo, "-o", "a.png", "--set", "surface.layers=1000000000"], "surface.layers"),
         (&["render", demo, "-o", "a.png", "--colormap", "viridi"], "`viridis`"),
         (&["render", demo, "-o", "a.png", "--color-by", "Positoin"], "`Position`"),

@@ -24,6 +24,7 @@ mod camera;
 mod color;
 mod color_points;
 mod colormap;
+pub mod density;
 mod elements;
 mod environment;
 mod error;
