@@ -162,11 +162,10 @@ fn begin(tile: &mut Tile<'_>, source: &Source<'_>) {
         row.fill(0.0);
         let Some(rough) = source.rough else { continue };
         let [y, z] = [tile.y[0] + number % tile.y[1], tile.z[0] + number / tile.y[1]];
-        let cells = rough.row([y, z]);
-        for (voxels, cell) in row.chunks_mut(rough.edge).zip(cells) {
-            if *cell != 0 {
+        rough.visit_row([y, z], |run| {
+            if let Some(voxels) = row.get_mut(run) {
                 voxels.fill(source.params.saturation);
             }
-        }
+        });
     }
 }

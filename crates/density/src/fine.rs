@@ -3,9 +3,10 @@
 //! Yasuda et al. 2009, §4.2.2–4.2.4. The density of a particle is W(r/R) ([`crate::kernel`]). Where a mask says
 //! that a side is filled, R shrinks towards it,
 //!
-//! > R₊ₓ = R + (R_min − R)·min(P₊ₓ / P_filled, 1),
+//! > R₊ₓ = R + (R_min − R)·min(P₊ₓ / P_filled, P±y / P_filled, P±z / P_filled, 1),
 //!
-//! and q = Σ (x / R±ₓ)² takes the place of (r/R)²: an eighth of an ellipsoid in each octant. Saturated voxels
+//! as far as the sides around it are filled, too: else the density beside an edge would shrink along it, and the
+//! surface sink; //! q = Σ (x / R±ₓ)² takes the place of (r/R)²: an eighth of an ellipsoid in each octant. Saturated voxels
 //! are skipped. Without both this is the plain field, every particle into every voxel in its reach, by the
 //! same code.
 
@@ -21,7 +22,7 @@ use crate::rough::Rough;
 /// The mask of a side that is filled at rest.
 const FILLED: f32 = 0.63;
 /// Reach towards a filled side, in voxels: with less, holes open between the voxels of particles.
-const LEAST_REACH: f32 = 1.4;
+const LEAST_REACH: f32 = 1.7;
 /// Voxels in a vector.
 pub(crate) const LANES: usize = 8;
 
@@ -68,11 +69,17 @@ impl Source<'_> {
         };
         if MASKED && let Some(masks) = self.particles.masks {
             let (mask, least) = (&masks[index], LEAST_REACH.min(far));
-            let side = |side: usize| {
-                let filled = (mask[side] * (1.0 / FILLED)).clamp(0.0, 1.0);
+            let both = |axis: usize| mask[2 * axis].min(mask[2 * axis + 1]);
+            let [x, y, z] = [both(0), both(1), both(2)];
+            let side = |side: usize, around: f32| {
+                let filled = (mask[side].min(around) * (1.0 / FILLED)).clamp(0.0, 1.0);
                 far + (least - far) * filled
             };
-            bump.reach = [[side(1), side(0)], [side(3), side(2)], [side(5), side(4)]];
+            bump.reach = [
+                [side(1, y.min(z)), side(0, y.min(z))],
+                [side(3, z.min(x)), side(2, z.min(x))],
+                [side(5, x.min(y)), side(4, x.min(y))],
+            ];
         }
         bump
     }

@@ -39,7 +39,8 @@ impl Lattice {
     pub fn new((low, high): (Vec3, Vec3), radius: f32, params: &Params) -> Self {
         let mut voxel = params.voxel.max(f32::MIN_POSITIVE);
         loop {
-            let lattice = Self::with_voxel((low, high), voxel, reach(radius, voxel, params));
+            let pad = reach(radius, voxel, params).max(params.drop * radius);
+            let lattice = Self::with_voxel((low, high), voxel, pad);
             let along = lattice.map(|(_, nodes)| nodes);
             if along.iter().product::<f64>() <= MOST_NODES && along.iter().all(|n| *n <= MOST_ALONG)
             {

@@ -4,8 +4,10 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::march::{self, Hits, LANES, LIQUID, OUTSIDE, Rays};
+use crate::lanes::LANES;
+use crate::march;
 use crate::normals::gradients;
+use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
 use crate::shade::Liquid;
 use crate::view::View;
 

@@ -10,14 +10,10 @@ use glam::Vec3;
 
 use crate::crossing::{Corners, crossing};
 use crate::field::Field;
+use crate::lanes::{LANES, Lanes};
+use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
 use crate::space::{DROPS, SURFACE, Space};
 
-/// Rays in a vector.
-pub(crate) const LANES: usize = 16;
-/// The medium of a ray outside.
-pub(crate) const OUTSIDE: u32 = u32::MAX;
-/// The medium of a ray in the field; what is less is in the drop of that number.
-pub(crate) const LIQUID: u32 = u32::MAX - 1;
 /// How far a ray goes beyond a cell it leaves, in voxels.
 const BEYOND: f32 = 5e-4;
 /// Idle lanes that are worth being given rays.
@@ -26,34 +22,6 @@ const IDLE: u32 = 4;
 const LOOKING: u32 = 6;
 /// Drops that overlap, one behind the other, at the most.
 const CHAIN: usize = 64;
-
-/// Rays in voxels.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Rays {
-    pub origin: [Vec<f32>; 3],
-    /// Unit vectors.
-    pub direction: [Vec<f32>; 3],
-    /// [`OUTSIDE`], [`LIQUID`], or a drop.
-    pub medium: Vec<u32>,
-    /// Where each enters and leaves the box of all surfaces.
-    from: Vec<f32>,
-    to: Vec<f32>,
-    inverse: [Vec<f32>; 3],
-}
-
-/// What rays meet.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Hits {
-    /// Voxels to the next surface; +∞ without one.
-    pub distance: Vec<f32>,
-    /// [`LIQUID`] or the drop whose surface it is.
-    pub surface: Vec<u32>,
-}
-
-/// Numbers of all lanes on their own lines of cache.
-#[repr(align(64))]
-#[derive(Clone, Copy)]
-pub(crate) struct Lanes<T>(pub [T; LANES]);
 
 /// Sixteen rays on their way.
 struct Walk {
@@ -75,35 +43,7 @@ enum Left {
     Into(f32),
 }
 
-impl Rays {
-    pub fn clear(&mut self) {
-        let rows = self.origin.iter_mut().chain(&mut self.direction);
-        rows.for_each(Vec::clear);
-        self.medium.clear();
-    }
-
-    pub fn len(&self) -> usize {
-        self.medium.len()
-    }
-
-    pub fn push(&mut self, origin: Vec3, direction: Vec3, medium: u32) {
-        for a in 0..3 {
-            self.origin[a].push(origin[a]);
-            self.direction[a].push(direction[a]);
-        }
-        self.medium.push(medium);
-    }
-
-    pub fn origin(&self, ray: usize) -> Vec3 {
-        Vec3::from_array([0, 1, 2].map(|a| self.origin[a][ray]))
-    }
-
-    pub fn direction(&self, ray: usize) -> Vec3 {
-        Vec3::from_array([0, 1, 2].map(|a| self.direction[a][ray]))
-    }
-}
-
-/// Finds what all rays meet. Their rows become whole vectors long.
+/// Finds what all rays meet.
 #[simd]
 pub(crate) fn march<S: Simd>(
     simd: S,
@@ -111,55 +51,14 @@ pub(crate) fn march<S: Simd>(
     rays: &mut Rays,
     hits: &mut Hits,
 ) {
-    let count = rays.len();
-    hits.distance.clear();
-    hits.distance.resize(count, f32::INFINITY);
-    hits.surface.clear();
-    hits.surface.resize(count, LIQUID);
-    clip(simd, space, rays);
-    let mut walk = Walk::new();
+    hits.clear(rays.len());
+    rays.clip(simd, space.bounds);
+    // Two in turns: one goes on while the other waits for memory.
+    let (mut one, mut other) = (Walk::new(), Walk::new());
     let mut next = 0;
-    loop {
-        if LANES as u32 - walk.alive.count_ones() >= IDLE {
-            walk.refill((field, space), (rays, &mut next), hits);
-            if walk.alive == 0 {
-                break;
-            }
-        }
-        walk.step(simd, (field, space), hits);
-    }
-}
-
-/// Finds where rays are in the box of all surfaces.
-#[inline(always)]
-fn clip<S: Simd>(simd: S, space: &Space, rays: &mut Rays) {
-    let count = rays.len();
-    let room = count.next_multiple_of(LANES);
-    for a in 0..3 {
-        rays.origin[a].resize(room, 0.0);
-        rays.direction[a].resize(room, 1.0);
-        rays.inverse[a].resize(room, 0.0);
-    }
-    rays.from.resize(room, 0.0);
-    rays.to.resize(room, 0.0);
-    let [low, high] = space.bounds;
-    let least = f32x16::splat(simd, 1e-12);
-    for at in (0..room).step_by(LANES) {
-        let mut from = f32x16::splat(simd, 0.0);
-        let mut to = f32x16::splat(simd, f32::INFINITY);
-        for a in 0..3 {
-            let o = f32x16::from_slice(simd, &rays.origin[a][at..at + LANES]);
-            let d = f32x16::from_slice(simd, &rays.direction[a][at..at + LANES]);
-            let d = d.abs().max(least).copysign(d);
-            let inverse = f32x16::splat(simd, 1.0) / d;
-            inverse.store_slice(&mut rays.inverse[a][at..at + LANES]);
-            let (one, other) = ((low[a] - o) * inverse, (high[a] - o) * inverse);
-            from = from.max(one.min(other));
-            to = to.min(one.max(other));
-        }
-        from.store_slice(&mut rays.from[at..at + LANES]);
-        to.store_slice(&mut rays.to[at..at + LANES]);
-    }
+    while one.advance(simd, (field, space), (rays, &mut next), hits)
+        | other.advance(simd, (field, space), (rays, &mut next), hits)
+    {}
 }
 
 impl Walk {
@@ -177,6 +76,25 @@ impl Walk {
             inside: 0,
             fresh: 0,
         }
+    }
+
+    /// Takes a step, with more rays where many lanes are idle; false if there are none left.
+    #[inline(always)]
+    fn advance<S: Simd>(
+        &mut self,
+        simd: S,
+        within: (&Field, &Space),
+        (rays, next): (&Rays, &mut usize),
+        hits: &mut Hits,
+    ) -> bool {
+        if LANES as u32 - self.alive.count_ones() >= IDLE {
+            self.refill(within, (rays, next), hits);
+        }
+        if self.alive == 0 {
+            return false;
+        }
+        self.step(simd, within, hits);
+        true
     }
 
     /// Gives the next rays to idle lanes.
@@ -230,27 +148,26 @@ impl Walk {
             let o = f32x16::from_slice(simd, &self.origin[a].0);
             let d = f32x16::from_slice(simd, &self.direction[a].0);
             place[a] = d.mul_add(t, o);
-            let last = f32x16::splat(simd, (space.cells[a] - 1) as f32);
-            cell[a] = place[a].floor().max(zero).min(last);
+            // The box of all surfaces lies within the cells.
+            cell[a] = place[a].floor().max(zero);
         }
         let at = [cell[0].to_int::<u32x16<S>>(), cell[1].to_int(), cell[2].to_int()];
         let row = at[2] * u32x16::splat(simd, space.cells[1] as u32) + at[1];
-        let index = row * u32x16::splat(simd, space.row as u32) + at[0];
+        let last = u32x16::splat(simd, space.jumps.len() as u32 - 1);
+        let index = (row * u32x16::splat(simd, space.row as u32) + at[0]).min(last);
         let mut indices = Lanes([0_u32; LANES]);
         index.store_slice(&mut indices.0);
-        let (mut jumps, mut look, mut drops) = (Lanes([0_u32; LANES]), 0_u32, 0_u32);
+        let mut jumps = Lanes([0_u32; LANES]);
         for lane in 0..LANES {
-            let jump = space.jumps[indices.0[lane] as usize];
-            look |= u32::from(jump == SURFACE) << lane;
-            drops |= u32::from(jump == DROPS) << lane;
-            jumps.0[lane] = u32::from(jump);
+            jumps.0[lane] = u32::from(space.jumps[indices.0[lane] as usize]);
         }
-        look = (look | drops) & self.alive;
-        drops &= look;
-        let looking = mask32x16::from_bitmask(simd, u64::from(look));
+        let jumps = u32x16::from_slice(simd, &jumps.0);
+        let in_drops = jumps.simd_eq(u32x16::splat(simd, u32::from(DROPS)));
+        let looking = in_drops | jumps.simd_eq(u32x16::splat(simd, u32::from(SURFACE)));
+        let look = looking.to_bitmask() as u32 & self.alive;
+        let drops = in_drops.to_bitmask() as u32 & look;
         let one = f32x16::splat(simd, 1.0);
-        let jump: f32x16<S> = u32x16::from_slice(simd, &jumps.0).to_float();
-        let jump = looking.select(one, jump.max(one));
+        let jump: f32x16<S> = looking.select(one, jumps.to_float());
         let mut end = f32x16::splat(simd, f32::INFINITY);
         for a in 0..3 {
             let o = f32x16::from_slice(simd, &self.origin[a].0);
@@ -268,7 +185,8 @@ impl Walk {
             moved |= look;
         }
         let on = mask32x16::from_bitmask(simd, u64::from(moved));
-        on.select(end + BEYOND, t).store_slice(&mut self.t.0);
+        let to = f32x16::from_slice(simd, &self.to.0);
+        on.select((end + BEYOND).min(to), t).store_slice(&mut self.t.0);
         self.fresh &= !moved;
         if looks {
             self.settle(simd, (field, space), (met, (t, end), drops), at, hits);
@@ -294,7 +212,8 @@ impl Walk {
         let index = row * u32x16::splat(simd, stride as u32) + at[0];
         let mut indices = Lanes([0_u32; LANES]);
         index.store_slice(&mut indices.0);
-        let mut corners = [Lanes([0.0; LANES]); 8];
+        // Pairs along x.
+        let mut pairs = [[Lanes([0.0; LANES]); 2]; 4];
         let mut left = look;
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
@@ -302,14 +221,15 @@ impl Walk {
             let first = indices.0[lane] as usize;
             let rows = [first, first + stride, first + stride * ny, first + stride * (ny + 1)];
             for (k, row) in rows.into_iter().enumerate() {
-                let pair = &field.values[row..row + 2];
-                corners[2 * k].0[lane] = pair[0];
-                corners[2 * k + 1].0[lane] = pair[1];
+                let to = &mut pairs[k][lane / 8].0[lane % 8 * 2..][..2];
+                to.copy_from_slice(&field.values[row..row + 2]);
             }
         }
         let mut values = [t; 8];
-        for k in 0..8 {
-            values[k] = f32x16::from_slice(simd, &corners[k].0) - threshold;
+        for k in 0..4 {
+            let low = f32x16::from_slice(simd, &pairs[k][0].0) - threshold;
+            let high = f32x16::from_slice(simd, &pairs[k][1].0) - threshold;
+            (values[2 * k], values[2 * k + 1]) = low.deinterleave(high);
         }
         let mut way = [t; 3];
         for a in 0..3 {

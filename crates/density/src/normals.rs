@@ -8,26 +8,22 @@ use fearless_simd::{f32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 
 use crate::field::Field;
-use crate::march::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes, V3};
 
-/// Gradients of sixteen places, in rows of x, y and z of which `at` is the first; they take the places' rows.
+/// Gradients of places, in rows of whole vectors, which they take.
 #[simd]
 pub(crate) fn gradients<S: Simd>(simd: S, field: &Field, rows: &mut [Vec<f32>; 3]) {
-    let count = rows[0].len() / LANES * LANES;
-    for at in (0..count).step_by(LANES) {
-        let mut place = [f32x16::splat(simd, 0.0); 3];
+    for at in (0..rows[0].len() / LANES * LANES).step_by(LANES) {
+        let found = sixteen(simd, field, V3::load(simd, rows, at));
         for a in 0..3 {
-            place[a] = f32x16::from_slice(simd, &rows[a][at..at + LANES]);
-        }
-        let found = sixteen(simd, field, place);
-        for a in 0..3 {
-            found[a].store_slice(&mut rows[a][at..at + LANES]);
+            found.0[a].store_slice(&mut rows[a][at..at + LANES]);
         }
     }
 }
 
+/// The gradients of sixteen places.
 #[inline(always)]
-fn sixteen<S: Simd>(simd: S, field: &Field, place: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+pub(crate) fn sixteen<S: Simd>(simd: S, field: &Field, V3(place): V3<S>) -> V3<S> {
     let dims = field.lattice.dims;
     let (one, stride) = (f32x16::splat(simd, 1.0), field.stride());
     let (mut u, mut cell) = (place, [u32x16::splat(simd, 0); 3]);
@@ -91,5 +87,5 @@ fn sixteen<S: Simd>(simd: S, field: &Field, place: [f32x16<S>; 3]) -> [f32x16<S>
     let left = mix(middles[2] - sides[4], sides[5] - middles[0], uz);
     let right = mix(middles[3] - sides[6], sides[7] - middles[1], uz);
     let gz = mix(left, right, uy);
-    [gx, gy, gz]
+    V3([gx, gy, gz])
 }

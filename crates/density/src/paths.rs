@@ -1,19 +1,22 @@
-//! Paths of light through the liquid, all of a tile at once, boundary by boundary.
+//! Paths of light through the liquid: all of a tile at once, boundary by boundary, sixteen at a time.
 //!
 //! Yasuda et al. 2009, §4.3: rays are cast, refracted and reflected up to a depth. What is reflected and what
 //! is refracted at the first surface are followed both; from then on each path goes on the way most of the
-//! light goes (Snell, Fresnel, total internal reflection), and what goes the other way is seen without
-//! further boundaries if it leaves the liquid, and else goes with the rest.
+//! light goes (Snell, Fresnel, total internal reflection: [`motes_scene::optics`]), and what goes the other way
+//! is seen without further boundaries if it leaves the liquid, and else goes with the rest.
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd_macros::simd;
 use glam::{Vec3, Vec4};
-use motes_scene::{Sight, optics};
 
 use crate::field::Field;
-use crate::march::{self, Hits, LANES, LIQUID, OUTSIDE, Rays};
-use crate::normals::gradients;
+use crate::lanes::{LANES, Lanes, V3, exp};
+use crate::march;
+use crate::normals::sixteen;
+use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
 use crate::shade::{Around, Optics};
 use crate::space::Space;
+use crate::surroundings::{self, Sights, lane_of, store};
 
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
 const PART: f32 = 0.02;
@@ -30,25 +33,29 @@ pub(crate) struct Caster<'a> {
     pub level: Level,
 }
 
-/// A path of light: what its ray is for.
-#[derive(Clone, Copy, Debug)]
-struct Path {
-    /// Which sample.
-    sample: u32,
-    /// The part of its light.
-    weight: Vec3,
-    /// Width and growth of the cone of its neighbours, see [`Sight`].
-    width: f32,
-    spread: f32,
-    /// What the liquid it is in takes, per unit of length.
-    absorption: Vec3,
-}
-
-/// Paths and their rays.
+/// Paths and their rays. Rows are longer than they are many.
 #[derive(Default)]
 struct Wave {
     rays: Rays,
-    paths: Vec<Path>,
+    /// Which sample each is of.
+    sample: Vec<u32>,
+    /// The part of its light.
+    weight: [Vec<f32>; 3],
+    /// What the liquid it is in takes, per unit of length.
+    absorption: [Vec<f32>; 3],
+    /// Width and growth of the cone of its neighbours, see [`motes_scene::Sight`].
+    width: Vec<f32>,
+    spread: Vec<f32>,
+}
+
+/// Sixteen paths.
+#[derive(Clone, Copy)]
+struct Paths<S: Simd> {
+    sample: u32x16<S>,
+    weight: V3<S>,
+    absorption: V3<S>,
+    width: f32x16<S>,
+    spread: f32x16<S>,
 }
 
 /// Memory of one thread.
@@ -57,26 +64,79 @@ pub(crate) struct Desk {
     now: Wave,
     next: Wave,
     hits: Hits,
-    normals: [Vec<f32>; 3],
 }
 
-/// A boundary that a path meets.
-struct Boundary {
-    place: Vec3,
-    normal: Vec3,
-    surface: u32,
-    inside: bool,
+/// Boundaries that sixteen paths meet.
+#[derive(Clone, Copy)]
+struct Boundary<S: Simd> {
+    place: V3<S>,
+    direction: V3<S>,
+    /// Towards where the ray comes from.
+    normal: V3<S>,
+    /// The medium behind it, of one that comes from outside.
+    surface: u32x16<S>,
+    inside: mask32x16<S>,
+}
+
+/// What becomes of light at sixteen boundaries, see [`motes_scene::optics::Split`].
+#[derive(Clone, Copy)]
+struct Split<S: Simd> {
+    reflected: V3<S>,
+    refracted: V3<S>,
+    /// Whether any is refracted.
+    through: mask32x16<S>,
+    reflectance: f32x16<S>,
 }
 
 impl Wave {
     fn clear(&mut self) {
         self.rays.clear();
-        self.paths.clear();
     }
 
-    fn push(&mut self, path: Path, (origin, direction): (Vec3, Vec3), medium: u32) {
-        self.rays.push(origin, direction, medium);
-        self.paths.push(path);
+    /// Makes room for sixteen more.
+    fn reserve(&mut self) {
+        self.rays.reserve();
+        let room = self.rays.medium.len();
+        if self.sample.len() < room {
+            self.sample.resize(room, 0);
+            let rows = self.weight.iter_mut().chain(&mut self.absorption);
+            rows.chain([&mut self.width, &mut self.spread]).for_each(|row| row.resize(room, 0.0));
+        }
+    }
+
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, at: usize) -> Paths<S> {
+        Paths {
+            sample: u32x16::from_slice(simd, &self.sample[at..at + LANES]),
+            weight: V3::load(simd, &self.weight, at),
+            absorption: V3::load(simd, &self.absorption, at),
+            width: f32x16::from_slice(simd, &self.width[at..at + LANES]),
+            spread: f32x16::from_slice(simd, &self.spread[at..at + LANES]),
+        }
+    }
+
+    /// Adds those of sixteen paths whose lane is set.
+    #[inline(always)]
+    fn push<S: Simd>(
+        &mut self,
+        mask: mask32x16<S>,
+        paths: &Paths<S>,
+        ray: (V3<S>, V3<S>),
+        medium: u32x16<S>,
+    ) {
+        if mask.to_bitmask() == 0 {
+            return;
+        }
+        self.reserve();
+        let at = self.rays.len()..self.rays.len() + LANES;
+        paths.sample.compress(mask).store_slice(&mut self.sample[at.clone()]);
+        for c in 0..3 {
+            paths.weight.0[c].compress(mask).store_slice(&mut self.weight[c][at.clone()]);
+            paths.absorption.0[c].compress(mask).store_slice(&mut self.absorption[c][at.clone()]);
+        }
+        paths.width.compress(mask).store_slice(&mut self.width[at.clone()]);
+        paths.spread.compress(mask).store_slice(&mut self.spread[at]);
+        self.rays.push_where(mask, ray, medium);
     }
 }
 
@@ -88,180 +148,317 @@ impl Caster<'_> {
         spread: f32,
         (light, desk): (&mut [Vec4], &mut Desk),
     ) {
-        desk.now.clear();
+        let wave = &mut desk.now;
+        wave.clear();
         for (sample, (origin, direction)) in rays.enumerate() {
             let place = self.field.lattice.place(origin);
-            let path = Path {
-                sample: sample as u32,
-                weight: Vec3::ONE,
-                width: 0.0,
-                spread,
-                absorption: self.optics.absorption,
-            };
-
             let wet = self.field.at(place) >= self.space.threshold;
-            desk.now.push(path, (place, direction), if wet { LIQUID } else { OUTSIDE });
+            wave.reserve();
+            let at = wave.rays.len();
+            wave.rays.push(place, direction, if wet { LIQUID } else { OUTSIDE });
+            wave.sample[at] = sample as u32;
+            for c in 0..3 {
+                wave.weight[c][at] = 1.0;
+                wave.absorption[c][at] = self.optics.absorption[c];
+            }
+            (wave.width[at], wave.spread[at]) = (0.0, spread);
         }
-        for boundary in 1..=self.optics.depth {
-            if desk.now.paths.is_empty() {
+        for number in 1..=self.optics.depth {
+            if desk.now.rays.len() == 0 {
                 break;
             }
-            let Desk { now, next, hits, normals } = &mut *desk;
+            let Desk { now, next, hits } = &mut *desk;
             next.clear();
-            dispatch!(self.level, simd => march::march(simd, (self.field, self.space), &mut now.rays, hits));
-            self.find_normals(&now.rays, hits, normals);
-            for ray in 0..now.paths.len() {
-                self.go_on((now, ray), (hits, normals), boundary, (next, light));
-            }
+            dispatch!(self.level, simd => {
+                march::march(simd, (self.field, self.space), &mut now.rays, hits);
+                follow(simd, (self, number), (now, hits), next, light);
+            });
             std::mem::swap(&mut desk.now, &mut desk.next);
         }
     }
+}
 
-    /// Gradients where rays meet the field, of all rays.
-    fn find_normals(&self, rays: &Rays, hits: &Hits, normals: &mut [Vec<f32>; 3]) {
-        let count = rays.len();
-        for a in 0..3 {
-            normals[a].clear();
-            let along = |ray: usize| {
-                let t = hits.distance[ray];
-                if t.is_finite() { rays.origin[a][ray] + rays.direction[a][ray] * t } else { 0.0 }
-            };
-            normals[a].extend((0..count).map(along));
-            normals[a].resize(count.next_multiple_of(LANES), 0.0);
-        }
-        dispatch!(self.level, simd => gradients(simd, self.field, normals));
+/// What becomes of all paths at their boundaries, the `number`-th of each.
+#[simd]
+fn follow<S: Simd>(
+    simd: S,
+    (caster, number): (&Caster<'_>, u32),
+    (wave, hits): (&Wave, &Hits),
+    next: &mut Wave,
+    light: &mut [Vec4],
+) {
+    for at in (0..wave.rays.len()).step_by(LANES) {
+        let left = wave.rays.len() - at;
+        let there = if left >= LANES { 0xffff } else { (1 << left) - 1 };
+        let there = mask32x16::from_bitmask(simd, there);
+        some(simd, (caster, number), (wave, hits), (at, there), (next, light));
+    }
+}
+
+/// The same of sixteen.
+#[inline(always)]
+fn some<S: Simd>(
+    simd: S,
+    (caster, number): (&Caster<'_>, u32),
+    (wave, hits): (&Wave, &Hits),
+    (at, there): (usize, mask32x16<S>),
+    (next, light): (&mut Wave, &mut [Vec4]),
+) {
+    let (lattice, zero) = (&caster.field.lattice, f32x16::splat(simd, 0.0));
+    let far = f32x16::splat(simd, f32::INFINITY);
+    let mut paths = wave.load(simd, at);
+    let origin = V3::load(simd, &wave.rays.origin, at);
+    let direction = V3::load(simd, &wave.rays.direction, at);
+    let medium = u32x16::from_slice(simd, &wave.rays.medium[at..at + LANES]);
+    let inside = !medium.simd_eq(u32x16::splat(simd, OUTSIDE));
+    let distance = f32x16::from_slice(simd, &hits.distance[at..at + LANES]);
+    let length = distance * lattice.voxel;
+    if number == 1 {
+        count(there, paths.sample, (light, 1.0));
     }
 
-    /// What becomes of a path.
-    fn go_on(
-        &self,
-        (wave, ray): (&Wave, usize),
-        (hits, normals): (&Hits, &[Vec<f32>; 3]),
-        number: u32,
-        (next, light): (&mut Wave, &mut [Vec4]),
-    ) {
-        let mut path = wave.paths[ray];
-        let (origin, direction) = (wave.rays.origin(ray), wave.rays.direction(ray));
-        let (medium, distance) = (wave.rays.medium[ray], hits.distance[ray]);
-        let inside = medium != OUTSIDE;
-        let length = distance * self.field.lattice.voxel;
-        let to = &mut light[path.sample as usize];
-        if number == 1 {
-            to.w += 1.0;
-        }
-        let reach = if distance.is_finite() { length } else { f32::INFINITY };
-        if let Some((seen, to_it)) =
-            self.around.meet(&self.sight(&path, (origin, direction), reach))
-        {
-            let wet = if inside && to_it.is_finite() { to_it } else { 0.0 };
-            let left = path.weight * optics::transmitted(path.absorption, wet);
-            if number == 1 && distance == f32::INFINITY && !self.around.shown {
-                to.w -= 1.0;
-            } else {
-                *to += (left * seen).extend(0.0);
+    // What is met on the way.
+    let sights = caster.sights(simd, &paths, (origin, direction), length);
+    let met = surroundings::meet(simd, caster.around, &sights, there);
+    let stopped = met.any & there;
+    if stopped.any_true() {
+        let far_away = met.distance.simd_ge(far);
+        let wet = (inside & !far_away).select(met.distance, zero);
+        let shown = match number == 1 && !caster.around.shown {
+            true => {
+                let nothing = stopped & distance.simd_ge(far);
+                count(nothing, paths.sample, (light, -1.0));
+                stopped & !nothing
             }
-            return;
-        }
-        if distance == f32::INFINITY {
-            return;
-        }
-        let place = origin + direction * distance;
-        let surface = hits.surface[ray];
-        let gradient = Vec3::new(normals[0][ray], normals[1][ray], normals[2][ray]);
-        let out = match surface {
-            LIQUID => -gradient,
-            drop => place - self.space.drops.drops[drop as usize].center,
+            false => stopped,
         };
-        let normal = out.normalize_or(if inside { direction } else { -direction });
-        if inside {
-            path.weight *= optics::transmitted(path.absorption, length);
+        let left = paths.weight.times(transmitted(paths.absorption, wet));
+        add(shown, paths.sample, left.times(met.light), light);
+    }
+    let on = there & !stopped & distance.simd_lt(far);
+    if !on.any_true() {
+        return;
+    }
+
+    // The boundary.
+    let t = on.select(distance, zero);
+    let place = origin.along(direction, t);
+    let surface = u32x16::from_slice(simd, &hits.surface[at..at + LANES]);
+    let mut out = -sixteen(simd, caster.field, place);
+    let in_drops = !surface.simd_eq(u32x16::splat(simd, LIQUID)) & on;
+    if in_drops.any_true() {
+        out = caster.from_drops(simd, (out, place), (surface, in_drops));
+    }
+    let back = V3::select(inside, direction, -direction);
+    let out = out.normalize_or(back);
+    let through = transmitted(paths.absorption, inside.select(t * lattice.voxel, zero));
+    paths.weight = paths.weight.times(through);
+    paths.width = paths.spread.mul_add(t * lattice.voxel, paths.width);
+    paths.spread += PART;
+    let normal = V3::select(inside, -out, out);
+    let met = Boundary { place, direction, normal, surface, inside };
+    if number == caster.optics.depth {
+        return caster.end(simd, (on, &paths), &met, light);
+    }
+    // An eye in the liquid goes on as others do from their second boundary on.
+    let first = if number == 1 { on & !inside } else { mask32x16::splat(simd, false) };
+    caster.begin(simd, (first, &paths), &met, (next, light));
+    caster.go_on(simd, (on & !first, &paths), &met, (next, light));
+}
+
+impl Caster<'_> {
+    #[inline(always)]
+    fn sights<S: Simd>(
+        &self,
+        simd: S,
+        paths: &Paths<S>,
+        (place, direction): (V3<S>, V3<S>),
+        reach: f32x16<S>,
+    ) -> Sights<S> {
+        let lattice = &self.field.lattice;
+        let voxel = f32x16::splat(simd, lattice.voxel);
+        let origin = V3::splat(simd, lattice.low).along(place, voxel);
+        Sights { origin, direction, reach, width: paths.width, spread: paths.spread }
+    }
+
+    /// Adds what some paths see of the surroundings, wherever these are.
+    #[inline(always)]
+    fn see<S: Simd>(
+        &self,
+        simd: S,
+        (mask, paths): (mask32x16<S>, &Paths<S>),
+        ray: (V3<S>, V3<S>),
+        light: &mut [Vec4],
+    ) {
+        if mask.any_true() {
+            let far = f32x16::splat(simd, f32::INFINITY);
+            let sights = self.sights(simd, paths, ray, far);
+            let met = surroundings::meet(simd, self.around, &sights, mask);
+            add(mask & met.any, paths.sample, paths.weight.times(met.light), light);
         }
-        path.width += path.spread * length;
-        path.spread += PART;
-        let met = Boundary { place, normal, surface, inside };
-        match number {
-            1 if !inside && self.optics.depth > 1 => self.first(path, direction, &met, (next, to)),
-            _ => self.split(path, direction, (&met, number), (next, to)),
-        }
+    }
+
+    /// At their last boundary paths see what lies behind it.
+    #[inline(always)]
+    fn end<S: Simd>(
+        &self,
+        simd: S,
+        (mask, paths): (mask32x16<S>, &Paths<S>),
+        met: &Boundary<S>,
+        light: &mut [Vec4],
+    ) {
+        let split = met.split(simd, self.optics.ior);
+        let on = V3::select(split.through, split.refracted, met.direction);
+        self.see(simd, (mask, paths), (met.place, on), light);
     }
 
     /// At the first surface both ways are followed.
-    fn first(
+    #[inline(always)]
+    fn begin<S: Simd>(
         &self,
-        path: Path,
-        direction: Vec3,
-        met: &Boundary,
-        (next, to): (&mut Wave, &mut Vec4),
+        simd: S,
+        (mask, paths): (mask32x16<S>, &Paths<S>),
+        met: &Boundary<S>,
+        (next, light): (&mut Wave, &mut [Vec4]),
     ) {
-        let split = optics::split(direction, met.normal, 1.0 / self.optics.ior);
-        let tint = self.tint(met.place);
-        if split.reflectance > 0.0 {
-            let part = Path { weight: path.weight * split.reflectance, ..path };
-            if split.reflectance < FAINT {
-                *to += (part.weight * self.background(&part, (met.place, split.reflected)))
-                    .extend(0.0);
-            } else {
-                next.push(part, (met.place, split.reflected), OUTSIDE);
-            }
-        }
-        if let Some(through) = split.refracted {
-            let weight = path.weight * (1.0 - split.reflectance);
-            let part = Path { weight, absorption: tint, ..path };
-            next.push(part, (met.place, through), met.surface);
-        }
-    }
-
-    /// At any other, the way most of the light goes.
-    fn split(
-        &self,
-        mut path: Path,
-        direction: Vec3,
-        (met, number): (&Boundary, u32),
-        (next, to): (&mut Wave, &mut Vec4),
-    ) {
-        let ior = self.optics.ior;
-        let (normal, eta) = if met.inside { (-met.normal, ior) } else { (met.normal, 1.0 / ior) };
-        let split = optics::split(direction, normal, eta);
-        if number == self.optics.depth {
-            let on = split.refracted.unwrap_or(direction);
-            *to += (path.weight * self.background(&path, (met.place, on))).extend(0.0);
+        if !mask.any_true() {
             return;
         }
-        let goes_on = split.refracted.filter(|_| split.reflectance < 0.5);
-        let (onward, inside) = match goes_on {
-            Some(through) => (through, !met.inside),
-            None => (split.reflected, met.inside),
-        };
-        let other = if goes_on.is_some() { Some(split.reflected) } else { split.refracted };
-        if let Some(other) = other.filter(|_| inside) {
-            let part = if goes_on.is_some() { split.reflectance } else { 1.0 - split.reflectance };
-            *to += (path.weight * part * self.background(&path, (met.place, other))).extend(0.0);
-            path.weight *= 1.0 - part;
+        let split = met.split(simd, self.optics.ior);
+        let thrown = Paths { weight: paths.weight * split.reflectance, ..*paths };
+        let ray = (met.place, split.reflected);
+        let faint = split.reflectance.simd_lt(f32x16::splat(simd, FAINT));
+        self.see(simd, (mask & faint, &thrown), ray, light);
+        next.push(mask & !faint, &thrown, ray, u32x16::splat(simd, OUTSIDE));
+        let rest = 1.0 - split.reflectance;
+        let on = mask & split.through;
+        let absorption = self.tints(simd, paths.absorption, (met.place, on));
+        let through = Paths { weight: paths.weight * rest, absorption, ..*paths };
+        next.push(on, &through, (met.place, split.refracted), met.surface);
+    }
+
+    /// At any other, paths go on the way most of the light goes.
+    #[inline(always)]
+    fn go_on<S: Simd>(
+        &self,
+        simd: S,
+        (mask, paths): (mask32x16<S>, &Paths<S>),
+        met: &Boundary<S>,
+        (next, light): (&mut Wave, &mut [Vec4]),
+    ) {
+        if !mask.any_true() {
+            return;
         }
-        if inside && !met.inside {
-            path.absorption = self.tint(met.place);
+        let split = met.split(simd, self.optics.ior);
+        let goes_on = split.through & split.reflectance.simd_lt(f32x16::splat(simd, 0.5));
+        let onward = V3::select(goes_on, split.refracted, split.reflected);
+        let inside = (goes_on & !met.inside) | (!goes_on & met.inside);
+        // The other way, if it is outside.
+        let other = V3::select(goes_on, split.reflected, split.refracted);
+        let seen = mask & inside & (goes_on | split.through);
+        let part = goes_on.select(split.reflectance, 1.0 - split.reflectance);
+        let aside = Paths { weight: paths.weight * part, ..*paths };
+        self.see(simd, (seen, &aside), (met.place, other), light);
+        let weight = V3::select(seen, paths.weight * (1.0 - part), paths.weight);
+        let enters = mask & inside & !met.inside;
+        let absorption = self.tints(simd, paths.absorption, (met.place, enters));
+        let medium = inside.select(met.surface, u32x16::splat(simd, OUTSIDE));
+        next.push(mask, &Paths { weight, absorption, ..*paths }, (met.place, onward), medium);
+    }
+
+    /// The ways out of drops at their surfaces; `out` elsewhere.
+    #[inline(always)]
+    fn from_drops<S: Simd>(
+        &self,
+        simd: S,
+        (out, place): (V3<S>, V3<S>),
+        (surface, mask): (u32x16<S>, mask32x16<S>),
+    ) -> V3<S> {
+        let (mut ways, places) = (store(out), store(place));
+        let mut drops = Lanes([0_u32; LANES]);
+        surface.store_slice(&mut drops.0);
+        let mut left = mask.to_bitmask();
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let center = self.space.drops.drops[drops.0[lane] as usize].center;
+            let way = lane_of(&places, lane) - center;
+            (0..3).for_each(|a| ways[a].0[lane] = way[a]);
         }
-        next.push(path, (met.place, onward), if inside { met.surface } else { OUTSIDE });
+        let of = |row: &Lanes<f32>| f32x16::from_slice(simd, &row.0);
+        V3([of(&ways[0]), of(&ways[1]), of(&ways[2])])
     }
 
-    /// What a path sees up to a distance in world units.
-    fn sight(&self, path: &Path, (place, direction): (Vec3, Vec3), reach: f32) -> Sight {
-        let origin = self.field.lattice.point(place);
-        Sight { origin, direction, reach, width: path.width, spread: path.spread }
-    }
-
-    /// The light from the surroundings, wherever they are.
-    fn background(&self, path: &Path, ray: (Vec3, Vec3)) -> Vec3 {
-        let seen = self.around.meet(&self.sight(path, ray, f32::INFINITY));
-        seen.map_or(Vec3::ZERO, |(light, _)| light)
-    }
-
-    /// What the liquid takes per unit of length behind a place of its surface: of coloured liquid, more of
-    /// other colours.
-    fn tint(&self, place: Vec3) -> Vec3 {
-        let Some(paint) = self.around.paint else { return self.optics.absorption };
-        let color = paint.color(self.field.lattice.point(place));
+    /// What the liquid takes per unit of length behind places of its surface; `same` elsewhere. Of coloured
+    /// liquid, more of other colours.
+    #[inline(always)]
+    fn tints<S: Simd>(&self, simd: S, same: V3<S>, (place, mask): (V3<S>, mask32x16<S>)) -> V3<S> {
+        let Some(paint) = self.around.paint else { return same };
+        let (mut tints, places) = (store(same), store(place));
         let mean = self.optics.absorption.element_sum() / 3.0;
-        -color.clamp(Vec3::splat(0.02), Vec3::ONE).map(f32::ln) * mean
+        let mut left = mask.to_bitmask();
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let color = paint.color(self.field.lattice.point(lane_of(&places, lane)));
+            let tint = -color.clamp(Vec3::splat(0.02), Vec3::ONE).map(f32::ln) * mean;
+            (0..3).for_each(|c| tints[c].0[lane] = tint[c]);
+        }
+        let of = |row: &Lanes<f32>| f32x16::from_slice(simd, &row.0);
+        V3([of(&tints[0]), of(&tints[1]), of(&tints[2])])
+    }
+}
+
+impl<S: Simd> Boundary<S> {
+    /// [`motes_scene::optics::split`].
+    #[inline(always)]
+    fn split(&self, simd: S, ior: f32) -> Split<S> {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let (direction, normal) = (self.direction, self.normal);
+        let eta = self.inside.select(f32x16::splat(simd, ior), f32x16::splat(simd, 1.0 / ior));
+        let cos1 = (-direction.dot(normal)).max(zero).min(one);
+        let reflected = direction.along(normal, cos1 * 2.0).normalize_or(normal);
+        let sin2 = eta * eta * (1.0 - cos1 * cos1);
+        let through = sin2.simd_lt(one);
+        let cos2 = (1.0 - sin2).max(zero).sqrt();
+        let refracted = (direction * eta).along(normal, eta * cos1 - cos2).normalize_or(-normal);
+        let s = (eta * cos1 - cos2) / (eta * cos1 + cos2);
+        let p = (cos1 - eta * cos2) / (cos1 + eta * cos2);
+        let reflectance = through.select((s * s + p * p) * 0.5, one);
+        Split { reflected, refracted, through, reflectance }
+    }
+}
+
+/// [`motes_scene::optics::transmitted`].
+#[inline(always)]
+fn transmitted<S: Simd>(absorption: V3<S>, length: f32x16<S>) -> V3<S> {
+    let [r, g, b] = absorption.0;
+    V3([exp(-(r * length)), exp(-(g * length)), exp(-(b * length))])
+}
+
+/// Adds light to the samples of some paths, one after the other.
+#[inline(always)]
+fn add<S: Simd>(mask: mask32x16<S>, sample: u32x16<S>, more: V3<S>, light: &mut [Vec4]) {
+    let rows = store(more);
+    let mut samples = Lanes([0_u32; LANES]);
+    sample.store_slice(&mut samples.0);
+    let mut left = mask.to_bitmask();
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        left &= left - 1;
+        light[samples.0[lane] as usize] += lane_of(&rows, lane).extend(0.0);
+    }
+}
+
+/// Adds to how much of the samples of some paths is covered.
+#[inline(always)]
+fn count<S: Simd>(mask: mask32x16<S>, sample: u32x16<S>, (light, more): (&mut [Vec4], f32)) {
+    let mut samples = Lanes([0_u32; LANES]);
+    sample.store_slice(&mut samples.0);
+    let mut left = mask.to_bitmask();
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        left &= left - 1;
+        light[samples.0[lane] as usize].w += more;
     }
 }

@@ -6,6 +6,8 @@
 //! particles' volume fills a good part of it, and saturated if it and the 26 around it are full. Particles
 //! in *cores*, whose whole reach is saturated, need not be visited at all.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::bins::Bins;
@@ -15,6 +17,9 @@ use crate::params::Particles;
 /// The part of a cell that particles fill where it is full. On a lattice, which may meet a cell with half
 /// as many particles as fit, it is 0.5.
 const FULL: f32 = 0.4;
+
+/// Voxels at the rim of what is saturated that are not: the surface may go through a full cell.
+const MARGIN: usize = 1;
 
 /// Cells of the rough field.
 #[derive(Clone, Debug, Default)]
@@ -54,7 +59,7 @@ impl Rough {
         self.erode_saturated(1);
         self.core.clone_from(&self.saturated);
         std::mem::swap(&mut self.core, &mut self.saturated);
-        self.erode_saturated((reach / edge as f32).ceil() as usize);
+        self.erode_saturated(((reach + MARGIN as f32) / edge as f32).ceil() as usize);
         std::mem::swap(&mut self.core, &mut self.saturated);
     }
 
@@ -144,11 +149,32 @@ impl Rough {
         }
     }
 
-    /// The cells of a row of voxels: 1 where they are saturated.
-    pub fn row(&self, [y, z]: [usize; 2]) -> &[u8] {
-        let [nx, ny, _] = self.dims;
-        let from = (z / self.edge * ny + y / self.edge) * nx;
-        &self.saturated[from..from + nx]
+    /// Calls `visit` with each run of saturated voxels of a row.
+    pub fn visit_row(&self, [y, z]: [usize; 2], mut visit: impl FnMut(Range<usize>)) {
+        let [nx, ny, nz] = self.dims;
+        let cell = |v: usize| v / self.edge;
+        let (y0, z0) = (y.saturating_sub(MARGIN), z.saturating_sub(MARGIN));
+        let (y1, z1) = (cell(y + MARGIN), cell(z + MARGIN));
+        if y1 >= ny || z1 >= nz {
+            return;
+        }
+        let row = |y: usize, z: usize| {
+            let from = (z * ny + y) * nx;
+            &self.saturated[from..from + nx]
+        };
+        let rows = [row(cell(y0), cell(z0)), row(cell(y0), z1), row(y1, cell(z0)), row(y1, z1)];
+        let mut begin = None;
+        for x in 0..=nx {
+            let set = x < nx && rows.iter().all(|row| row[x] != 0);
+            match (set, begin) {
+                (true, None) => begin = Some(x),
+                (false, Some(first)) => {
+                    visit(first * self.edge + MARGIN..x * self.edge - MARGIN);
+                    begin = None;
+                }
+                _ => {}
+            }
+        }
     }
 
     /// Whether all that a particle at a place reaches is saturated.

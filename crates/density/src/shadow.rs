@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::layers::passed;
-use crate::march::{OUTSIDE, Rays};
+use crate::rays::{OUTSIDE, Rays};
 use crate::shade::Liquid;
 
 /// Pixels along the edge of the map.

@@ -51,9 +51,8 @@ impl Cloud {
             let all = cloud.positions.len() == system.particles.len();
             cloud.masks = Some(match own.filter(|column| all && column.components == 6) {
                 Some(own) => {
-                    let mask = |i: &u32| {
-                        std::array::from_fn(|side| own.number(*i as usize, side) as f32)
-                    };
+                    let mask =
+                        |i: &u32| std::array::from_fn(|side| own.number(*i as usize, side) as f32);
                     cloud.indices.iter().map(mask).collect()
                 }
                 None => masks(&cloud.positions, cloud.mean_radius as f32),
@@ -157,8 +156,11 @@ impl Cast<'_> {
             false => Err(Error::Cancelled),
         };
         stage(0)?;
-        let environment =
-            environment(&self.scene.density.environment, (self.scene, self.resolved), (bounds, self.origin))?;
+        let environment = environment(
+            &self.scene.density.environment,
+            (self.scene, self.resolved),
+            (bounds, self.origin),
+        )?;
         let (mut field, mut space) = (Field::default(), Space::default());
         self.fill((&mut field, &mut space), (&cloud, bounds), stats);
         stage(1)?;
@@ -177,10 +179,7 @@ impl Cast<'_> {
 
     fn view(&self) -> View {
         let image = &self.scene.image;
-        View {
-            rays: self.resolved.view.rays(self.origin),
-            size: (image.width, image.height),
-        }
+        View { rays: self.resolved.view.rays(self.origin), size: (image.width, image.height) }
     }
 
     /// Makes the field, and finds what rays can skip in it.
