@@ -37,6 +37,18 @@ struct Walk {
     fresh: u32,
 }
 
+/// Where lanes are.
+#[derive(Clone, Copy)]
+struct Here<S: Simd> {
+    /// The cell.
+    at: [u32x16<S>; 3],
+    /// The place in it.
+    place: [f32x16<S>; 3],
+    /// How far along the ray that is, and where it leaves the cell, or what it jumps over.
+    t: f32x16<S>,
+    end: f32x16<S>,
+}
+
 /// What a ray does at the end of a drop.
 enum Left {
     Out(f32, u32),
@@ -176,12 +188,14 @@ impl Walk {
             end = end.min((bound - o) * inverse);
         }
         let end = end.max(t);
+        let mut here = Here { at, place, t, end };
         let mut moved = self.alive & !look;
         let looks = look.count_ones() >= LOOKING || moved == 0;
         let mut met = f32x16::splat(simd, f32::INFINITY);
         if looks {
             let place = [place[0] - cell[0], place[1] - cell[1], place[2] - cell[2]];
-            met = self.look(simd, (field, space.threshold), at, (place, t, end), look);
+            here.place = place;
+            met = self.look(simd, (field, space.threshold), &here, look);
             moved |= look;
         }
         let on = mask32x16::from_bitmask(simd, u64::from(moved));
@@ -189,7 +203,7 @@ impl Walk {
         on.select((end + BEYOND).min(to), t).store_slice(&mut self.t.0);
         self.fresh &= !moved;
         if looks {
-            self.settle(simd, (field, space), (met, (t, end), drops), at, hits);
+            self.settle((field, space), &here, (met, drops), hits);
         }
         let t = f32x16::from_slice(simd, &self.t.0);
         let gone = t.simd_ge(f32x16::from_slice(simd, &self.to.0)).to_bitmask() as u32;
@@ -202,10 +216,10 @@ impl Walk {
         &self,
         simd: S,
         (field, threshold): (&Field, f32),
-        at: [u32x16<S>; 3],
-        (place, t, end): ([f32x16<S>; 3], f32x16<S>, f32x16<S>),
+        here: &Here<S>,
         look: u32,
     ) -> f32x16<S> {
+        let Here { at, place, t, end } = *here;
         let [_, ny, _] = field.lattice.dims;
         let stride = field.stride();
         let row = at[2] * u32x16::splat(simd, ny as u32) + at[1];
@@ -246,12 +260,13 @@ impl Walk {
     #[inline(always)]
     fn settle<S: Simd>(
         &mut self,
-        simd: S,
         (field, space): (&Field, &Space),
-        (met, (t, end), drops): (f32x16<S>, (f32x16<S>, f32x16<S>), u32),
-        at: [u32x16<S>; 3],
+        here: &Here<S>,
+        (met, drops): (f32x16<S>, u32),
         hits: &mut Hits,
     ) {
+        let simd = met.token();
+        let Here { at, t, end, .. } = *here;
         let crossed = met.simd_lt(f32x16::splat(simd, f32::INFINITY)).to_bitmask() as u32;
         let mut distances = Lanes([0.0; LANES]);
         met.store_slice(&mut distances.0);

@@ -52,8 +52,8 @@ impl Params {
     pub fn with_voxel(voxel: f32) -> Self {
         Self {
             voxel,
-            support: 4.0,
-            threshold: 0.4,
+            support: 5.0,
+            threshold: 0.2,
             saturation: 2.0,
             rough: true,
             masked: false,

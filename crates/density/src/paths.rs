@@ -247,7 +247,7 @@ fn some<S: Simd>(
     let mut out = -sixteen(simd, caster.field, place);
     let in_drops = !surface.simd_eq(u32x16::splat(simd, LIQUID)) & on;
     if in_drops.any_true() {
-        out = caster.from_drops(simd, (out, place), (surface, in_drops));
+        out = caster.ways_out(simd, (out, place), (surface, in_drops));
     }
     let back = V3::select(inside, direction, -direction);
     let out = out.normalize_or(back);
@@ -368,7 +368,7 @@ impl Caster<'_> {
 
     /// The ways out of drops at their surfaces; `out` elsewhere.
     #[inline(always)]
-    fn from_drops<S: Simd>(
+    fn ways_out<S: Simd>(
         &self,
         simd: S,
         (out, place): (V3<S>, V3<S>),

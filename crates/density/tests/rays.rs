@@ -150,7 +150,8 @@ fn a_ball_of_liquid_is_a_lens() {
     }
     let particles =
         Particles { positions: &positions, radii: Radii::Uniform(0.5 * spacing), masks: None };
-    let params = Params { support: 8.0, ..Params::with_voxel(spacing) };
+    // Half of the density: where the liquid ends.
+    let params = Params { support: 8.0, threshold: 0.5, ..Params::with_voxel(spacing) };
     let (field, space) = made(&particles, &params);
     let liquid = Liquid { field: &field, space: &space, level: Level::new() };
     let view = view(Vec3::ZERO, 5.0, 2.6, (96, 72));
@@ -174,7 +175,8 @@ fn a_ball_of_liquid_is_a_lens() {
             if off < 0.9 {
                 let chord = 2.0 * (radius * radius - off * off).sqrt();
                 assert!((seen.thickness - chord).abs() < 0.05, "{} {chord}", seen.thickness);
-                assert!(seen.normal.dot(point.normalize()) > 0.99, "{}", seen.normal);
+                // The lattice shows through the surface.
+                assert!(seen.normal.dot(point.normalize()) > 0.97, "{}", seen.normal);
             }
         }
     }

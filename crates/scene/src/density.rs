@@ -14,9 +14,9 @@ settings! {
         /// How far the density of a particle reaches, in its radii; at least two voxels. More is smoother.
         support: f64 = 5.0,
         /// Density at the surface; deep in a liquid at rest it is 1.
-        threshold: f64 = 0.4,
-        /// Density from which on voxels are skipped, in thresholds.
-        saturation: f64 = 5.0,
+        threshold: f64 = 0.2,
+        /// Density from which on voxels are skipped, in thresholds; with 5, as in the paper, liquid at rest is skipped, too, and normals near the surface are a little different.
+        saturation: f64 = 10.0,
         /// Whether what is full for certain is found first, from how many particles are in cells, and skipped. Changes the speed, hardly ever the picture.
         rough: bool = true,
         /// Whether densities shrink towards sides that are filled (the paper's particle masks): fewer voxels are written, and the surface is a little lower.
