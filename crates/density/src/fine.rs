@@ -25,6 +25,8 @@ const FILLED: f32 = 0.63;
 const LEAST_REACH: f32 = 1.7;
 /// Voxels in a vector.
 pub(crate) const LANES: usize = 8;
+/// Rows along a tile's edge at the most.
+pub(crate) const MOST_ROWS: usize = 64;
 
 /// What densities are made from.
 #[derive(Clone, Copy)]
@@ -131,7 +133,7 @@ fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
     let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
     let count = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
     let x = count + (first as f32 - bump.at[0]);
-    let [low, high] = bump.reach[0].map(|r| 1.0 / r);
+    let [[low, high], of_y, of_z] = bump.reach.map(|sides| sides.map(|r| 1.0 / r));
     let x = match MASKED {
         true => x * x.simd_lt(zero).select(f32x8::splat(simd, low), f32x8::splat(simd, high)),
         false => x * low,
@@ -140,10 +142,14 @@ fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
     let left = one - x * x;
     let ys = whole(bump.at[1], bump.reach[1], [tile.y[0], tile.y[0] + tile.y[1]]);
     let zs = whole(bump.at[2], bump.reach[2], [tile.z[0], tile.z[0] + tile.z[1]]);
+    let mut parts = [0.0; MOST_ROWS];
+    for y in ys[0]..ys[1] {
+        parts[y - tile.y[0]] = part(y, bump.at[1], of_y);
+    }
     for z in zs[0]..zs[1] {
-        let qz = part(z, bump.at[2], bump.reach[2]);
+        let qz = part(z, bump.at[2], of_z);
         for y in ys[0]..ys[1] {
-            let q = qz + part(y, bump.at[1], bump.reach[1]);
+            let q = qz + parts[y - tile.y[0]];
             if q >= 1.0 {
                 continue;
             }
@@ -166,10 +172,10 @@ fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
     }
 }
 
-/// The part of q that one axis makes.
+/// The part of q that one axis makes, of which one over the reach to each side is known.
 #[inline(always)]
-fn part(voxel: usize, at: f32, reach: [f32; 2]) -> f32 {
+fn part(voxel: usize, at: f32, per_reach: [f32; 2]) -> f32 {
     let d = voxel as f32 - at;
-    let d = d / if d < 0.0 { reach[0] } else { reach[1] };
+    let d = d * if d < 0.0 { per_reach[0] } else { per_reach[1] };
     d * d
 }

@@ -141,28 +141,18 @@ impl Wave {
 }
 
 impl Caster<'_> {
-    /// The light of rays from points of the world; `spread` is how much a pixel widens with distance.
+    /// The light at places of a picture (x in one row, y in the other; as long as `light` or longer, in whole
+    /// vectors), whose pixels are `finer` times as small as its rays say.
     pub fn trace(
         &self,
-        rays: impl Iterator<Item = (Vec3, Vec3)>,
-        spread: f32,
+        (rays, finer): (&motes_scene::Rays, usize),
+        places: &[Vec<f32>; 2],
         (light, desk): (&mut [Vec4], &mut Desk),
     ) {
         let wave = &mut desk.now;
         wave.clear();
-        for (sample, (origin, direction)) in rays.enumerate() {
-            let place = self.field.lattice.place(origin);
-            let wet = self.field.at(place) >= self.space.threshold;
-            wave.reserve();
-            let at = wave.rays.len();
-            wave.rays.push(place, direction, if wet { LIQUID } else { OUTSIDE });
-            wave.sample[at] = sample as u32;
-            for c in 0..3 {
-                wave.weight[c][at] = 1.0;
-                wave.absorption[c][at] = self.optics.absorption[c];
-            }
-            (wave.width[at], wave.spread[at]) = (0.0, spread);
-        }
+        let spread = rays.pixel / finer as f32;
+        dispatch!(self.level, simd => set_out(simd, (self, rays, spread), (places, light.len()), wave));
         for number in 1..=self.optics.depth {
             if desk.now.rays.len() == 0 {
                 break;
@@ -175,6 +165,57 @@ impl Caster<'_> {
             });
             std::mem::swap(&mut desk.now, &mut desk.next);
         }
+    }
+}
+
+/// Begins the paths of all samples.
+#[simd]
+fn set_out<S: Simd>(
+    simd: S,
+    (caster, rays, spread): (&Caster<'_>, &motes_scene::Rays, f32),
+    (places, count): (&[Vec<f32>; 2], usize),
+    wave: &mut Wave,
+) {
+    let lattice = &caster.field.lattice;
+    let medium = |point: Vec3| {
+        let wet = caster.field.at(lattice.place(point)) >= caster.space.threshold;
+        if wet { LIQUID } else { OUTSIDE }
+    };
+    let perspective = rays.projection == motes_scene::Projection::Perspective;
+    let of_eye = medium(rays.origin);
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let [forward, right, up] = [rays.forward, rays.right, rays.up].map(|v| V3::splat(simd, v));
+    let whole = V3([splat(1.0); 3]);
+    let first = u32x16::from_slice(simd, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+    for at in (0..count).step_by(LANES) {
+        let of = |row: &Vec<f32>| f32x16::from_slice(simd, &row[at..at + LANES]);
+        let a = (of(&places[0]) - rays.center[0]) * rays.pixel;
+        let b = (rays.center[1] - of(&places[1])) * rays.pixel;
+        let across = (right * a).along(up, b);
+        let eye = V3::splat(simd, rays.origin);
+        let (origin, direction) = match perspective {
+            true => (eye, (forward + across).normalize_or(forward)),
+            false => (eye + across, forward),
+        };
+        let mut media = Lanes([of_eye; LANES]);
+        if !perspective {
+            let origins = store(origin);
+            for lane in 0..LANES {
+                media.0[lane] = medium(lane_of(&origins, lane));
+            }
+        }
+        let origin = (origin - V3::splat(simd, lattice.low)) * splat(1.0 / lattice.voxel);
+        let left = count - at;
+        let mask = if left >= LANES { 0xffff } else { (1 << left) - 1 };
+        let paths = Paths {
+            sample: first + u32x16::splat(simd, at as u32),
+            weight: whole,
+            absorption: V3::splat(simd, caster.optics.absorption),
+            width: splat(0.0),
+            spread: splat(spread),
+        };
+        let mask = mask32x16::from_bitmask(simd, mask);
+        wave.push(mask, &paths, (origin, direction), u32x16::from_slice(simd, &media.0));
     }
 }
 
@@ -257,9 +298,12 @@ fn some<S: Simd>(
     paths.spread += PART;
     let normal = V3::select(inside, -out, out);
     let met = Boundary { place, direction, normal, surface, inside };
-    if number == caster.optics.depth {
-        return caster.end(simd, (on, &paths), &met, light);
-    }
+    // Of what is faint, or has met enough, what lies behind is seen.
+    let [r, g, b] = paths.weight.0;
+    let faint = r.max(g).max(b).simd_lt(f32x16::splat(simd, FAINT));
+    let ends = if number == caster.optics.depth { on } else { on & faint };
+    caster.end(simd, (ends, &paths), &met, light);
+    let on = on & !ends;
     // An eye in the liquid goes on as others do from their second boundary on.
     let first = if number == 1 { on & !inside } else { mask32x16::splat(simd, false) };
     caster.begin(simd, (first, &paths), &met, (next, light));
@@ -307,6 +351,9 @@ impl Caster<'_> {
         met: &Boundary<S>,
         light: &mut [Vec4],
     ) {
+        if !mask.any_true() {
+            return;
+        }
         let split = met.split(simd, self.optics.ior);
         let on = V3::select(split.through, split.refracted, met.direction);
         self.see(simd, (mask, paths), (met.place, on), light);

@@ -11,6 +11,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::bins::Bins;
+use crate::fine::MOST_ROWS;
 use crate::lattice::Lattice;
 use crate::params::Particles;
 
@@ -18,6 +19,8 @@ use crate::params::Particles;
 /// as many particles as fit, it is 0.5.
 const FULL: f32 = 0.4;
 
+/// Planes of cells that are worth a thread.
+const MIN_PLANES: usize = 32;
 /// Voxels at the rim of what is saturated that are not: the surface may go through a full cell.
 const MARGIN: usize = 1;
 
@@ -40,7 +43,7 @@ pub(crate) struct Rough {
 /// Voxels along the edge of a cell that is about two particles wide.
 pub(crate) fn edge(radius: f32, voxel: f32) -> usize {
     // A hair less, as the default voxel is exactly half a cell.
-    let wide = (4.0 * radius / voxel * 0.999).ceil().clamp(1.0, 64.0);
+    let wide = (4.0 * radius / voxel * 0.999).ceil().clamp(1.0, MOST_ROWS as f32);
     (wide as usize).next_power_of_two()
 }
 
@@ -121,22 +124,22 @@ impl Rough {
             // Along x and y, then along z.
             self.spare.resize(self.saturated.len(), 0);
             let from = &self.saturated;
-            self.spare.par_chunks_mut(nx * ny).zip(from.par_chunks(nx * ny)).for_each(
-                |(to, from)| {
-                    to.fill(0);
-                    for y in 1..ny.saturating_sub(1) {
-                        for x in 1..nx.saturating_sub(1) {
-                            let three = |y: usize| {
-                                let at = y * nx + x;
-                                from[at - 1] & from[at] & from[at + 1]
-                            };
-                            to[y * nx + x] = three(y - 1) & three(y) & three(y + 1);
-                        }
+            let planes = self.spare.par_chunks_mut(nx * ny).zip(from.par_chunks(nx * ny));
+            planes.with_min_len(MIN_PLANES).for_each(|(to, from)| {
+                to.fill(0);
+                for y in 1..ny.saturating_sub(1) {
+                    for x in 1..nx.saturating_sub(1) {
+                        let three = |y: usize| {
+                            let at = y * nx + x;
+                            from[at - 1] & from[at] & from[at + 1]
+                        };
+                        to[y * nx + x] = three(y - 1) & three(y) & three(y + 1);
                     }
-                },
-            );
+                }
+            });
             let flat = &self.spare;
-            self.saturated.par_chunks_mut(nx * ny).enumerate().for_each(|(z, to)| {
+            let planes = self.saturated.par_chunks_mut(nx * ny).enumerate();
+            planes.with_min_len(MIN_PLANES).for_each(|(z, to)| {
                 if z == 0 || z + 1 >= nz {
                     return to.fill(0);
                 }

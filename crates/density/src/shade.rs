@@ -6,6 +6,7 @@ use motes_scene::{Beyond, Sight};
 use rayon::prelude::*;
 
 use crate::field::Field;
+use crate::lanes::LANES;
 use crate::paths::{Caster, Desk};
 use crate::shadow::Shadow;
 use crate::space::Space;
@@ -153,14 +154,15 @@ impl Artist<'_> {
         let (width, finer) = (self.view.size.0 as usize, self.finer);
         light.clear();
         light.resize(pixels.len(), Vec4::ZERO);
+        let room = pixels.len().next_multiple_of(LANES);
+        let mut places = [vec![0.0; room], vec![0.0; room]];
         for sample in samples {
             let offset = [sample % finer, sample / finer].map(|i| (i as f32 + 0.5) / finer as f32);
-            let ray = |pixel: &u32| {
+            for (i, pixel) in pixels.iter().enumerate() {
                 let [x, y] = [*pixel as usize % width, *pixel as usize / width];
-                self.view.rays.ray(x as f32 + offset[0], y as f32 + offset[1])
-            };
-            let spread = self.view.rays.pixel / finer as f32;
-            self.caster.trace(pixels.iter().map(ray), spread, (light, desk));
+                (places[0][i], places[1][i]) = (x as f32 + offset[0], y as f32 + offset[1]);
+            }
+            self.caster.trace((&self.view.rays, finer), &places, (light, desk));
         }
     }
 }

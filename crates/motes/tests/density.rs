@@ -73,7 +73,7 @@ fn hidden_particles_do_not_count() {
 
 #[test]
 fn a_drop_is_the_particle_and_seen() {
-    let alone = render(&["system.where='Particle Index == 7'", "density.resolution=4"], 1);
+    let alone = render(&["system.where='Index == 7'", "density.resolution=4"], 1);
     let id = numbers(&alone, "id");
     let seen = id.iter().filter(|id| **id == 7.0).count();
     assert!(seen > 1000 && id.iter().all(|id| [7.0, -1.0].contains(id)), "{seen}");
@@ -100,7 +100,7 @@ fn masks_are_the_files_or_made() {
     };
     let seen =
         |picture: &Picture| numbers(picture, "depth").iter().filter(|d| d.is_finite()).count();
-    let (own, made) = (at(&[]), at(&["system.where='Particle Index != 3'"]));
+    let (own, made) = (at(&[]), at(&["system.where='Index != 3'"]));
     let (own, made) = (seen(&own) as f64, seen(&made) as f64);
     assert!(own > 100.0 && (own - made).abs() < 0.1 * own, "{own} {made}");
 }
