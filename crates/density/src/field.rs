@@ -12,6 +12,8 @@ use crate::rough::{self, Rough};
 
 /// Rows along a tile's edge, at the least.
 const TILE: usize = 8;
+/// Rows that are worth larger tiles, which fewer particles share.
+const MANY_ROWS: usize = 1 << 13;
 
 /// What was done for a field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,17 +68,14 @@ impl Field {
         self.lattice = Lattice::new((survey.low, survey.high), radius, params);
         let (lattice, mean) = (self.lattice, (survey.radii / survey.count as f64) as f32);
         let edge = rough::edge(mean, lattice.voxel);
-        self.bins.fill(particles, &lattice, (params, edge.max(TILE)));
+        let tile = if lattice.dims[1] * lattice.dims[2] >= MANY_ROWS { 2 * TILE } else { TILE };
+        self.bins.fill(particles, &lattice, (params, edge.max(tile)));
         if params.rough {
             let far = reach(radius, lattice.voxel, params) / lattice.voxel;
             self.rough.fill((&self.bins, particles), &lattice, (edge, far));
         }
-        let source = Source {
-            particles: *particles,
-            lattice: &lattice,
-            params,
-            rough: params.rough.then_some(&self.rough),
-        };
+        let rough = params.rough.then_some(&self.rough);
+        let source = Source::new(*particles, (&lattice, params), rough);
         let stride = self.stride();
         self.values.resize(stride * lattice.dims[1] * lattice.dims[2], 0.0);
         let bins = &self.bins;
@@ -85,14 +84,12 @@ impl Field {
         tiles.par_iter_mut().enumerate().with_max_len(1).for_each(|(number, tile)| {
             begin(tile, &source);
             for entries in bins.parts(number) {
-                match masked {
-                    true => {
-                        dispatch!(level, simd => fine::add::<_, true, COUNTED>(simd, &source, entries, tile));
-                    }
-                    false => {
-                        dispatch!(level, simd => fine::add::<_, false, COUNTED>(simd, &source, entries, tile));
-                    }
-                }
+                dispatch!(level, simd => match (masked, params.rough) {
+                    (true, true) => fine::add::<_, true, true, COUNTED>(simd, &source, entries, tile),
+                    (true, false) => fine::add::<_, true, false, COUNTED>(simd, &source, entries, tile),
+                    (false, true) => fine::add::<_, false, true, COUNTED>(simd, &source, entries, tile),
+                    (false, false) => fine::add::<_, false, false, COUNTED>(simd, &source, entries, tile),
+                });
             }
         });
         let sum = |of: fn(&Tile<'_>) -> u64| tiles.iter().map(of).sum();

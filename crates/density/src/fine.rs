@@ -12,6 +12,7 @@
 
 use fearless_simd::{f32x8, mask32x8, prelude::*};
 use fearless_simd_macros::simd;
+use motes_grid::Radii;
 
 use crate::bins::Entry;
 use crate::kernel::amplitude;
@@ -35,6 +36,8 @@ pub(crate) struct Source<'a> {
     pub lattice: &'a Lattice,
     pub params: &'a Params,
     pub rough: Option<&'a Rough>,
+    /// Reach and amplitude, where all have the same.
+    uniform: Option<(f32, f32)>,
 }
 
 /// A tile's rows, and where they are.
@@ -58,17 +61,35 @@ struct Bump {
     amplitude: f32,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    pub fn new(
+        particles: Particles<'a>,
+        (lattice, params): (&'a Lattice, &'a Params),
+        rough: Option<&'a Rough>,
+    ) -> Self {
+        let mut source = Self { particles, lattice, params, rough, uniform: None };
+        if let Radii::Uniform(radius) = particles.radii {
+            source.uniform = Some(source.spread(radius));
+        }
+        source
+    }
+
+    /// Reach and amplitude of a particle of some radius, in voxels.
+    #[inline(always)]
+    fn spread(&self, radius: f32) -> (f32, f32) {
+        let voxel = self.lattice.voxel;
+        let far = reach(radius, voxel, self.params) / voxel;
+        (far, amplitude(radius / voxel, far))
+    }
+
     #[inline(always)]
     fn bump<const MASKED: bool>(&self, entry: &Entry) -> Bump {
         let index = entry.index as usize;
-        let radius = self.particles.radius(index);
-        let far = reach(radius, self.lattice.voxel, self.params) / self.lattice.voxel;
-        let mut bump = Bump {
-            at: entry.at,
-            reach: [[far; 2]; 3],
-            amplitude: amplitude(radius / self.lattice.voxel, far),
+        let (far, amplitude) = match self.uniform {
+            Some(same) => same,
+            None => self.spread(self.particles.radius(index)),
         };
+        let mut bump = Bump { at: entry.at, reach: [[far; 2]; 3], amplitude };
         if MASKED && let Some(masks) = self.particles.masks {
             let (mask, least) = (&masks[index], LEAST_REACH.min(far));
             let both = |axis: usize| mask[2 * axis].min(mask[2 * axis + 1]);
@@ -89,7 +110,7 @@ impl Source<'_> {
 
 /// Adds the densities of particles to a tile.
 #[simd]
-pub(crate) fn add<S: Simd, const MASKED: bool, const COUNTED: bool>(
+pub(crate) fn add<S: Simd, const MASKED: bool, const SATURATES: bool, const COUNTED: bool>(
     simd: S,
     source: &Source<'_>,
     entries: &[Entry],
@@ -103,27 +124,27 @@ pub(crate) fn add<S: Simd, const MASKED: bool, const COUNTED: bool>(
         }
         tile.visits += 1;
         let bump = source.bump::<MASKED>(entry);
-        // The first row begins where the density does; what lies before it is met by rounding only.
         let along = whole(bump.at[0], bump.reach[0], [0, source.lattice.dims[0]]);
         let mut first = along[0];
         while first < along[1] {
-            add_columns::<S, MASKED, COUNTED>(simd, source, (&bump, first), tile);
+            add_columns::<S, MASKED, SATURATES, COUNTED>(simd, source, (&bump, first), tile);
             first += LANES;
         }
     }
 }
 
-/// The whole numbers within reach of a place, from the first to before the last, within limits.
+/// The whole numbers within reach of a place, but for the ends, from the first to before the last, within
+/// limits.
 #[inline(always)]
 fn whole(at: f32, reach: [f32; 2], [from, to]: [usize; 2]) -> [usize; 2] {
-    let first = (at - reach[0]).max(0.0) as usize;
+    let first = (at - reach[0]).max(0.0) as usize + 1;
     let last = (at + reach[1]).max(0.0) as usize + 1;
     [first.max(from), last.min(to)]
 }
 
 /// Adds a density to [`LANES`] columns of a tile from `first` on.
 #[inline(always)]
-fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
+fn add_columns<S: Simd, const MASKED: bool, const SATURATES: bool, const COUNTED: bool>(
     simd: S,
     source: &Source<'_>,
     (bump, first): (&Bump, usize),
@@ -142,30 +163,31 @@ fn add_columns<S: Simd, const MASKED: bool, const COUNTED: bool>(
     let left = one - x * x;
     let ys = whole(bump.at[1], bump.reach[1], [tile.y[0], tile.y[0] + tile.y[1]]);
     let zs = whole(bump.at[2], bump.reach[2], [tile.z[0], tile.z[0] + tile.z[1]]);
+    if ys[0] >= ys[1] {
+        return;
+    }
     let mut parts = [0.0; MOST_ROWS];
     for y in ys[0]..ys[1] {
-        parts[y - tile.y[0]] = part(y, bump.at[1], of_y);
+        parts[y - ys[0]] = part(y, bump.at[1], of_y);
     }
     for z in zs[0]..zs[1] {
         let qz = part(z, bump.at[2], of_z);
-        for y in ys[0]..ys[1] {
-            let q = qz + parts[y - tile.y[0]];
-            if q >= 1.0 {
-                continue;
-            }
-            let w = (left - q).max(zero);
+        let begin = (z - tile.z[0]) * tile.y[1] + ys[0] - tile.y[0];
+        let rows = &mut tile.rows[begin..begin + ys[1] - ys[0]];
+        for (row, qy) in rows.iter_mut().zip(&parts) {
+            // Rows that are hardly met are not worth a test.
+            let w = (left - (qz + qy)).max(zero);
             let more = w * w * (w * bump.amplitude);
-            let row = &mut *tile.rows[(z - tile.z[0]) * tile.y[1] + y - tile.y[0]];
             let Some(voxels) = row.get_mut(first..first + LANES) else { continue };
             let before = f32x8::from_slice(simd, voxels);
-            let open: mask32x8<S> = before.simd_lt(saturation) & w.simd_gt(zero);
-            let after = match source.rough {
-                Some(_) => open.select((before + more).min(saturation), before),
-                None => before + more,
+            let after = match SATURATES {
+                true => (before + more).min(saturation).max(before),
+                false => before + more,
             };
             after.store_slice(voxels);
             if COUNTED {
-                let written = if source.rough.is_some() { open } else { w.simd_gt(zero) };
+                let open = if SATURATES { before.simd_lt(saturation) } else { one.simd_gt(zero) };
+                let written: mask32x8<S> = open & w.simd_gt(zero);
                 tile.updates += u64::from(written.to_bitmask().count_ones());
             }
         }

@@ -150,8 +150,8 @@ fn a_ball_of_liquid_is_a_lens() {
     }
     let particles =
         Particles { positions: &positions, radii: Radii::Uniform(0.5 * spacing), masks: None };
-    // Half of the density: where the liquid ends.
-    let params = Params { support: 8.0, threshold: 0.5, ..Params::with_voxel(spacing) };
+    // Near half of the density: where the liquid ends.
+    let params = Params { support: 8.0, threshold: 0.35, ..Params::with_voxel(spacing) };
     let (field, space) = made(&particles, &params);
     let liquid = Liquid { field: &field, space: &space, level: Level::new() };
     let view = view(Vec3::ZERO, 5.0, 2.6, (96, 72));
@@ -168,7 +168,8 @@ fn a_ball_of_liquid_is_a_lens() {
             lens(origin, direction, (Vec3::ZERO, radius)).unwrap_or_else(|| Hues::light(direction));
         error += f64::from((Vec3::from_slice(found) - expected).length_squared());
         let seen = &seen[i];
-        if seen.distance.is_finite() {
+        // Corners of the lattice are drops.
+        if seen.distance.is_finite() && seen.drop.is_none() {
             let point = origin + direction * seen.distance;
             let b = -origin.dot(direction);
             let off = (origin + direction * b).length();
@@ -301,10 +302,9 @@ fn masks_move_the_surface_by_less_than_a_voxel() {
         }
     }
     let (mean, color) = (sum / f64::from(both), color / depths.len() as f64);
-    eprintln!("mean {mean} off {off} one {one} both {both} color {color} {all} {written}");
     assert!(both > 3000 && mean < 0.25, "{mean} {off} {one} of {both}");
     assert!(one < both / 50, "{one} of {both}");
-    assert!(color < 0.05, "{color}");
+    assert!(color < 0.02, "{color}");
 }
 
 #[test]
