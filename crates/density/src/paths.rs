@@ -8,9 +8,10 @@
 use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::{Vec3, Vec4};
+use motes_scene::exp;
 
 use crate::field::Field;
-use crate::lanes::{LANES, Lanes, V3, exp};
+use crate::lanes::{LANES, Lanes, V3};
 use crate::march;
 use crate::normals::sixteen;
 use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
@@ -480,7 +481,8 @@ impl<S: Simd> Boundary<S> {
 #[inline(always)]
 fn transmitted<S: Simd>(absorption: V3<S>, length: f32x16<S>) -> V3<S> {
     let [r, g, b] = absorption.0;
-    V3([exp(-(r * length)), exp(-(g * length)), exp(-(b * length))])
+    let simd = length.token();
+    V3([exp(simd, -(r * length)), exp(simd, -(g * length)), exp(simd, -(b * length))])
 }
 
 /// Adds light to the samples of some paths, one after the other.

@@ -1,15 +1,11 @@
-//! What sixteen rays meet outside: [`Environment::meet`] in vectors, for a day or a gradient over a floor;
-//! whatever else is asked ray by ray.
+//! What sixteen rays meet outside: of plain surroundings all at once, of anything else ray by ray.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 use glam::Vec3;
-use motes_scene::{Environment, Floor, Sight, Sky};
+use motes_scene::{Sight, look_sixteen};
 
-use crate::lanes::{LANES, Lanes, V3, exp};
+use crate::lanes::{LANES, Lanes, V3};
 use crate::shade::Around;
-
-/// Least cosine to the sun for which its disk is seen.
-const NEAR_SUN: f32 = 0.97;
 
 /// Sixteen sights, see [`Sight`].
 #[derive(Clone, Copy)]
@@ -38,12 +34,13 @@ pub(crate) fn meet<S: Simd>(
     sights: &Sights<S>,
     wanted: mask32x16<S>,
 ) -> Met<S> {
-    let met = match around.beyond.environment() {
-        Some(Environment { sky, floor }) if !matches!(sky, Sky::Image(_)) => {
-            meet_plain(simd, (sky, floor.as_ref()), sights, wanted)
-        }
-        _ => return meet_each(simd, around, sights, wanted),
+    let Some(environment) = around.beyond.environment() else {
+        return meet_each(simd, around, sights, wanted);
     };
+    let cone = [sights.width, sights.spread];
+    let ray = (sights.origin.0, sights.direction.0, cone);
+    let (light, distance) = look_sixteen(simd, environment, ray);
+    let met = Met { light: V3(light), distance, any: distance.simd_le(sights.reach) };
     match around.shadow {
         Some(shadow) => {
             let there = met.distance.simd_lt(f32x16::splat(simd, f32::INFINITY)) & wanted & met.any;
@@ -58,121 +55,6 @@ pub(crate) fn meet<S: Simd>(
             Met { light: met.light * f32x16::from_slice(simd, &lit.0), ..met }
         }
         None => met,
-    }
-}
-
-#[inline(always)]
-fn meet_plain<S: Simd>(
-    simd: S,
-    (sky, floor): (&Sky, Option<&Floor>),
-    sights: &Sights<S>,
-    wanted: mask32x16<S>,
-) -> Met<S> {
-    let far = f32x16::splat(simd, f32::INFINITY);
-    let Some(floor) = floor else {
-        let any = sights.reach.simd_ge(far);
-        return Met { light: light_of(simd, sky, sights.direction), distance: far, any };
-    };
-    let up = V3::splat(simd, floor.up);
-    let down = -sights.direction.dot(up);
-    let above = (sights.origin - V3::splat(simd, floor.point)).dot(up);
-    let distance = above / down;
-    let zero = f32x16::splat(simd, 0.0);
-    let on_floor = down.simd_gt(f32x16::splat(simd, 1e-6))
-        & above.simd_gt(zero)
-        & distance.simd_lt(far)
-        & distance.simd_le(sights.reach);
-    let any = on_floor | sights.reach.simd_ge(far);
-    // A distant floor is the haze at the horizon.
-    let level = sights.direction.along(up, down).normalize_or(sights.direction);
-    let mut light = light_of(simd, sky, V3::select(on_floor, level, sights.direction));
-    if (on_floor & wanted).any_true() {
-        let point = sights.origin.along(sights.direction, distance);
-        let seen = point - V3::splat(simd, floor.point);
-        let seen = seen.along(up, -seen.dot(up));
-        let wide = distance.mul_add(sights.spread, sights.width) / down.max(zero).sqrt();
-        let left = exp(-seen.dot(seen).sqrt() / floor.fade);
-        let tiles = tiles(simd, floor, (seen, wide));
-        light = V3::select(on_floor, light.mix(tiles, left), light);
-    }
-    Met { light, distance: on_floor.select(distance, far), any }
-}
-
-/// The light of a floor over squares about places in it.
-#[inline(always)]
-fn tiles<S: Simd>(simd: S, floor: &Floor, (seen, wide): (V3<S>, f32x16<S>)) -> V3<S> {
-    let ahead = floor.up.any_orthonormal_vector();
-    let side = floor.up.cross(ahead);
-    let per_tile = f32x16::splat(simd, 1.0 / floor.tile);
-    let wide = (wide * per_tile).max(f32x16::splat(simd, 1e-3));
-    let mut odd = [wide; 2];
-    let mut bare = [wide; 2];
-    for (k, axis) in [ahead, side].into_iter().enumerate() {
-        let at = seen.dot(V3::splat(simd, axis)) * per_tile;
-        odd[k] = covered(at * 0.5, wide * 0.5, 0.5) * 2.0 - 1.0;
-        bare[k] = 1.0 - covered(at + 0.5 * Floor::JOINT, wide, Floor::JOINT);
-    }
-    let [one, other] = floor.colors.map(|color| V3::splat(simd, color));
-    let mixed = one.mix(other, 0.5 - odd[0] * odd[1] * 0.5);
-    mixed * (1.0 - (1.0 - bare[0] * bare[1]) * 0.4)
-}
-
-/// The part of the stretch of length `wide` about `x` that lies within `part` behind whole numbers.
-#[inline(always)]
-fn covered<S: Simd>(x: f32x16<S>, wide: f32x16<S>, part: f32) -> f32x16<S> {
-    let (low, high) = (x - wide * 0.5, x + wide * 0.5);
-    let (before, behind) = (low.floor(), high.floor());
-    let part = f32x16::splat(x.token(), part);
-    let up_to_low = before.mul_add(part, (low - before).min(part));
-    (behind.mul_add(part, (high - behind).min(part)) - up_to_low) / wide
-}
-
-/// [`Sky::light`].
-#[inline(always)]
-fn light_of<S: Simd>(simd: S, sky: &Sky, direction: V3<S>) -> V3<S> {
-    let color = |c: Vec3| V3::splat(simd, c);
-    match sky {
-        Sky::Gradient { up, top, bottom } => {
-            let height = direction.dot(V3::splat(simd, *up));
-            color(*bottom).mix(
-                color(*top),
-                height.mul_add(f32x16::splat(simd, 0.5), f32x16::splat(simd, 0.5)),
-            )
-        }
-        Sky::Day { up, sun } => {
-            let zero = f32x16::splat(simd, 0.0);
-            let height = direction.dot(V3::splat(simd, *up));
-            let above = height.simd_ge(zero);
-            let part = above
-                .select(height.max(zero).sqrt(), (height * -4.0).min(f32x16::splat(simd, 1.0)));
-            let other = V3::select(above, color(Sky::ZENITH), color(Sky::BELOW));
-            let base = color(Sky::HORIZON).mix(other, part);
-            let toward = direction.dot(V3::splat(simd, *sun)).max(zero);
-            // toward²⁴; and toward¹⁵⁰⁰, of numbers whose powers are not too small.
-            let squares = |mut v: f32x16<S>, times: usize| {
-                for _ in 0..times {
-                    v *= v;
-                }
-                v
-            };
-            let hazy = toward.max(f32x16::splat(simd, 0.03));
-            let eight = squares(hazy, 3);
-            let haze = eight * eight * eight;
-            let near = toward.max(f32x16::splat(simd, NEAR_SUN));
-            let four = squares(near, 2);
-            let (eight, sixteen) = (four * four, squares(four, 2));
-            let sixty_four = squares(sixteen, 2);
-            let many = squares(sixty_four, 4);
-            let disk = many
-                * squares(sixty_four, 2)
-                * squares(sixty_four, 1)
-                * sixty_four
-                * sixteen
-                * eight
-                * four;
-            base.along(color(Sky::SUN), disk * 12.0 + haze * 0.5)
-        }
-        Sky::Image(_) => color(Vec3::ZERO),
     }
 }
 
@@ -227,7 +109,7 @@ pub(crate) fn lane_of(rows: &[Lanes<f32>; 3], lane: usize) -> Vec3 {
 mod tests {
     use fearless_simd::{Level, dispatch};
     use fearless_simd_macros::simd;
-    use motes_scene::Beyond;
+    use motes_scene::{Beyond, Environment, Floor, Sky};
 
     use super::*;
 

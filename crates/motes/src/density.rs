@@ -12,9 +12,10 @@ use motes_density::{
 use motes_frame::{Frame, Layer};
 use motes_grid::{Grid, Radii, Resolution, Visibility};
 use motes_particles::read::names;
-use motes_scene::{Bounds, Environment, Lights, Resolved, Scene};
+use motes_scene::{Beyond, Bounds, Environment, Lights, Resolved, Scene};
 
 use crate::environment::{FLOOR_FILL, WATER, environment};
+use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
@@ -135,6 +136,8 @@ pub(crate) struct Cast<'a> {
     /// The point that positions are about.
     pub origin: DVec3,
     pub level: Level,
+    /// What stands before the liquid and in it.
+    pub others: Option<Others<'a>>,
 }
 
 impl Cast<'_> {
@@ -222,8 +225,9 @@ impl Cast<'_> {
         let start = Instant::now();
         let painted = self.system.paint.uniform().is_none();
         let colors = painted.then(|| Colors { nearest: Nearest::new(cloud), cast: self });
+        let scenery = self.others.map(|o| Scenery::new(environment, o, (&lights, self.level)));
         let around = Around {
-            beyond: environment,
+            beyond: scenery.as_ref().map_or(environment as &dyn Beyond, |s| s),
             shown: self.scene.density.environment != "none" && !self.scene.image.transparent,
             shadow: shadow.as_ref(),
             paint: colors.as_ref().map(|colors| colors as &dyn Paint),

@@ -200,10 +200,6 @@ impl Session {
             ));
         }
 
-        if self.scene.renderer == Renderer::Density && loaded.len() > 1 {
-            self.notes
-                .push("renderer density: the first system is drawn, the others are not".into());
-        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
@@ -214,13 +210,9 @@ impl Session {
             Renderer::Spheres => {
                 self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?
             }
-            Renderer::Surface => {
+            Renderer::Surface | Renderer::Density => {
                 let bounds = boxes.iter().copied().reduce(Bounds::union);
-                self.flow(&loaded, (&resolved, origin, bounds), layers, &mut stats)?
-            }
-            Renderer::Density => {
-                let bounds = boxes.iter().copied().reduce(Bounds::union);
-                self.cast(&loaded, (&resolved, origin, bounds), layers, (&mut stats, watch))?
+                self.flow(&loaded, (&resolved, origin, bounds), layers, (&mut stats, watch))?
             }
         };
         stats.ms.insert("trace", milliseconds(start));
@@ -356,14 +348,14 @@ impl Session {
         loaded: &[Loaded],
         (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
         layers: bool,
-        stats: &mut Stats,
+        (stats, watch): (&mut Stats, &dyn Watch),
     ) -> Result<Frame> {
         let [system, others @ ..] = loaded else {
-            return Err(Error::Usage("renderer surface: no system is visible".into()));
+            let name = if self.scene.renderer == Renderer::Density { "density" } else { "surface" };
+            return Err(Error::Usage(format!("renderer {name}: no system is visible")));
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let matter = Matter::of(system);
         let systems: Vec<_> = others.iter().map(Loaded::spheres).collect();
         let paint = Paints(others);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
@@ -374,6 +366,11 @@ impl Session {
         let others = Others { systems: &systems, paint: &paint, bounds: corners };
         let others = (!systems.is_empty()).then_some(others);
         let scene = &self.scene;
+        if scene.renderer == Renderer::Density {
+            let cast = Cast { scene, system, resolved, bounds, origin, level, others };
+            return cast.draw(layers, (stats, watch));
+        }
+        let matter = Matter::of(system);
         let types = match scene.surface.media {
             motes_scene::surface::Media::One => Vec::new(),
             motes_scene::surface::Media::Types => system.visible_by_type()?,
@@ -387,23 +384,6 @@ impl Session {
         let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
         let media = &media[..];
         Liquid { scene, matter, media, resolved, bounds, origin, level, others }.draw(layers, stats)
-    }
-
-    /// The first system as a liquid, by a field of voxels.
-    fn cast(
-        &self,
-        loaded: &[Loaded],
-        (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
-        layers: bool,
-        (stats, watch): (&mut Stats, &dyn Watch),
-    ) -> Result<Frame> {
-        let [system, ..] = loaded else {
-            return Err(Error::Usage("renderer density: no system is visible".into()));
-        };
-        let level = Level::new();
-        stats.simd = instruction_set(level).into();
-        Cast { scene: &self.scene, system, resolved, bounds, origin, level }
-            .draw(layers, (stats, watch))
     }
 
     fn trace(

@@ -119,13 +119,18 @@ fn a_watch_can_cancel() {
 }
 
 #[test]
-fn systems_that_are_not_drawn_are_told() {
-    let mut scene = Scene::default();
-    scene.set_sources(&["demo:dam:1000".into(), "demo:packed:1000".into()]);
-    for assignment in ["renderer=density", "image.width=8", "image.height=8"] {
-        scene.set_text(assignment).unwrap();
-    }
-    let mut session = Session::open(scene, Some(1)).unwrap();
-    session.render(0, Layers::No, &Quiet).unwrap();
-    assert!(session.warnings().iter().any(|w| w.contains("first system")));
+fn other_systems_stand_beside_it() {
+    let picture = |sources: &[String]| {
+        let mut scene = Scene::default();
+        scene.set_sources(sources);
+        let view = ["camera.position=0.5,-3,1.5", "camera.target=0.5,0.5,0.5"];
+        let rest = ["renderer=density", "image.width=60", "image.height=45"];
+        for assignment in view.iter().chain(&rest) {
+            scene.set_text(assignment).unwrap();
+        }
+        let mut session = Session::open(scene, Some(2)).unwrap();
+        session.render(0, Layers::No, &Quiet).unwrap().raw
+    };
+    let both = ["demo:dam:1000", "demo:packed:1000"].map(String::from);
+    assert!(picture(&both) != picture(&both[..1]));
 }

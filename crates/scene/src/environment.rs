@@ -20,7 +20,7 @@ pub trait Beyond: Sync {
         self.meet(sight).map(|(_, distance)| distance).filter(|d| d.is_finite())
     }
 
-    /// The environment, if it is nothing else: what sixteen rays may ask themselves, see [`crate::look`].
+    /// The environment, if it is nothing else: what sixteen rays may ask themselves, see [`crate::look_sixteen`].
     fn environment(&self) -> Option<&Environment> {
         None
     }
