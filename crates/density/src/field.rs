@@ -12,6 +12,8 @@ use crate::rough::{self, Rough};
 
 /// Rows along a tile's edge, at the least.
 const TILE: usize = 8;
+/// Edge of a voxel in mean radii, at the least: finer ones would show nothing more.
+const LEAST_VOXEL: f32 = 0.25;
 /// Rows that are worth larger tiles, which fewer particles share.
 const MANY_ROWS: usize = 1 << 13;
 
@@ -64,9 +66,11 @@ impl Field {
             self.values.resize(self.stride() * 16, 0.0);
             return;
         }
-        let radius = survey.greatest_radius;
+        let (radius, mean) = (survey.greatest_radius, (survey.radii / survey.count as f64) as f32);
+        let voxel = params.voxel.max(LEAST_VOXEL * mean);
+        let params = &Params { voxel, ..*params };
         self.lattice = Lattice::new((survey.low, survey.high), radius, params);
-        let (lattice, mean) = (self.lattice, (survey.radii / survey.count as f64) as f32);
+        let lattice = self.lattice;
         let edge = rough::edge(mean, lattice.voxel);
         let tile = if lattice.dims[1] * lattice.dims[2] >= MANY_ROWS { 2 * TILE } else { TILE };
         self.bins.fill(particles, &lattice, (params, edge.max(tile)));

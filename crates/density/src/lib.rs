@@ -2,7 +2,9 @@
 //!
 //! Yasuda, Harada & Kawaguchi 2009, *Fast Rendering of Particle-Based Fluid by Utilizing Simulation Data*.
 //!
-//! - [`Field`]: the density of particles at the nodes of a [`Lattice`]
+//! - [`Field`]: the density of particles at the nodes of a [`Lattice`] (§4.2)
+//! - [`Space`]: what rays can skip in it, and the particles that are drops (§5)
+//! - [`shade()`]: pictures, by rays with several refractions (§4.3); [`Shadow`]; [`layers()`]
 //! - [`mod@reference`] is the definition, by brute force in f64; for tests.
 //!
 //! Invariants: no file, clock or environment is read here, and no result depends on the number of threads.

@@ -31,7 +31,7 @@ impl Particles<'_> {
 /// How the field is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Params {
-    /// Edge of a voxel, world units; larger where there would be too many.
+    /// Edge of a voxel, world units; larger where there would be too many, and at least a quarter of a radius.
     pub voxel: f32,
     /// How far the density of a particle reaches, in its radii; at least two voxels.
     pub support: f32,
