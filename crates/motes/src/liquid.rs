@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
 use motes_grid::Visibility;
 use motes_scene::surface::{self, Culling, Filtering};
-use motes_scene::{Beyond, Bounds, CameraView, Environment, Floor, Lights, Resolved, Scene, Sky};
+use motes_scene::{Beyond, Bounds, CameraView, Environment, Lights, Resolved, Scene};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Medium, Mode, Occlusion, Optics, Paint,
     Params, Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress,
@@ -17,7 +17,7 @@ use motes_surface::{
 };
 
 use crate::Result;
-use crate::environment::sky_of;
+use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::paint;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
@@ -26,12 +26,6 @@ use crate::system::Loaded;
 
 /// Rows of the light's own view.
 const SHADOW_ROWS: u32 = 1024;
-/// How much of the light on the floor is the sky's.
-const FLOOR_FILL: f32 = 0.45;
-/// What clear water takes of red, green and blue over the width of what is visible.
-const WATER: DVec3 = DVec3::new(2.6, 0.75, 0.45);
-/// Tiles of the floor over the width of what is visible.
-const TILES: f64 = 8.0;
 
 /// What a liquid is made of.
 #[derive(Clone, Copy)]
@@ -170,7 +164,8 @@ impl Liquid<'_> {
         (boundary, optics): (&Boundary, &Optics),
         stats: &mut Stats,
     ) -> Result<Setting> {
-        let environment = self.environment(bounds)?;
+        let name = &self.scene.surface.environment;
+        let environment = environment(name, (self.scene, self.resolved), (bounds, self.origin))?;
         let lights = self.resolved.lights.about(self.origin);
         let start = Instant::now();
         let shadow = (lights.key.shadow_rays > 0).then(|| self.shadow(boundary, bounds, optics));
@@ -379,38 +374,6 @@ impl Liquid<'_> {
             Mode::Refractive => mean,
         };
         Shadow { view, spans, extinction, offset: 2.0 * self.ball() as f32, fill: FLOOR_FILL }
-    }
-
-    fn environment(&self, bounds: Bounds) -> Result<Environment> {
-        let up = self.scene.camera.up_axis.vector();
-        let (resolved, name) = (self.resolved, &self.scene.surface.environment);
-        let sun = resolved.lights.key.direction;
-        let background = &resolved.background;
-        Ok(match name.as_str() {
-            "none" => {
-                let (top, bottom) = (background.top, background.bottom);
-                let sky = Sky::Gradient { up: up.as_vec3(), top, bottom };
-                Environment { sky, floor: None }
-            }
-            "sky" => {
-                let sky = Sky::Day { up: up.as_vec3(), sun };
-                let across = bounds.diagonal();
-                let lowest =
-                    bounds.corners().iter().map(|c| c.dot(up)).fold(f64::INFINITY, f64::min);
-                let center = bounds.center();
-                // Balls are larger than particles: what lies on the floor wets it.
-                let point = center + up * (lowest - center.dot(up)) - self.origin;
-                let floor = Floor {
-                    point: point.as_vec3(),
-                    up: up.as_vec3(),
-                    tile: (across / TILES) as f32,
-                    colors: [Vec3::new(0.80, 0.79, 0.76), Vec3::new(0.62, 0.64, 0.66)],
-                    fade: (3.0 * across) as f32,
-                };
-                Environment { sky, floor: Some(floor) }
-            }
-            path => Environment { sky: sky_of(path, up.as_vec3())?, floor: None },
-        })
     }
 }
 

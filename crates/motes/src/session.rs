@@ -14,6 +14,7 @@ use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 
 use crate::annotate::{Annotated, annotations};
+use crate::density::Cast;
 use crate::liquid::{Liquid, Matter};
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
@@ -209,9 +210,9 @@ impl Session {
             Renderer::Spheres => {
                 self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?
             }
-            Renderer::Surface => {
+            Renderer::Surface | Renderer::Density => {
                 let bounds = boxes.iter().copied().reduce(Bounds::union);
-                self.flow(&loaded, (&resolved, origin, bounds), layers, &mut stats)?
+                self.flow(&loaded, (&resolved, origin, bounds), layers, (&mut stats, watch))?
             }
         };
         stats.ms.insert("trace", milliseconds(start));
@@ -324,7 +325,11 @@ impl Session {
             // Beside a series, what has one frame stands still.
             let still = own > 0 && self.series.len() > 1 && self.series[i].frames(&report)? == 1;
             let own = if still { 0 } else { own };
-            let wanted = wanted(system);
+            let mut wanted = wanted(system);
+            let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
+            if masked && let Wanted::Only(columns) = &mut wanted {
+                columns.push(names::PARTICLE_MASK.into());
+            }
             if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
                 self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
             }
@@ -343,14 +348,14 @@ impl Session {
         loaded: &[Loaded],
         (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
         layers: bool,
-        stats: &mut Stats,
+        (stats, watch): (&mut Stats, &dyn Watch),
     ) -> Result<Frame> {
         let [system, others @ ..] = loaded else {
-            return Err(Error::Usage("renderer surface: no system is visible".into()));
+            let name = if self.scene.renderer == Renderer::Density { "density" } else { "surface" };
+            return Err(Error::Usage(format!("renderer {name}: no system is visible")));
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let matter = Matter::of(system);
         let systems: Vec<_> = others.iter().map(Loaded::spheres).collect();
         let paint = Paints(others);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
@@ -361,6 +366,11 @@ impl Session {
         let others = Others { systems: &systems, paint: &paint, bounds: corners };
         let others = (!systems.is_empty()).then_some(others);
         let scene = &self.scene;
+        if scene.renderer == Renderer::Density {
+            let cast = Cast { scene, system, resolved, bounds, origin, level, others };
+            return cast.draw(layers, (stats, watch));
+        }
+        let matter = Matter::of(system);
         let types = match scene.surface.media {
             motes_scene::surface::Media::One => Vec::new(),
             motes_scene::surface::Media::Types => system.visible_by_type()?,

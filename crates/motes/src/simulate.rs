@@ -133,7 +133,7 @@ impl Simulated {
         (self.kept.len() + 1) * each <= KEPT_BYTES
     }
 
-    fn begin(&self) -> std::result::Result<Simulation, String> {
+    pub(crate) fn begin(&self) -> std::result::Result<Simulation, String> {
         let mut simulation = Simulation::new(self.setup.clone(), &self.sph);
         if let Some(Start { at, positions, velocities }) = &self.restart {
             simulation.restart(*at, positions, velocities)?;

@@ -338,7 +338,7 @@ fn bad_usage_names_the_nearest_word() {
     for (args, part) in [
         (&["rendr"][..], "'render'"),
         (&["render", demo, "-o", "a.png", "--colr-by", "x"], "'--color-by'"),
-        (&["render", demo, "-o", "a.png", "--renderer", "sphere"], "spheres, surface"),
+        (&["render", demo, "-o", "a.png", "--renderer", "sphere"], "spheres, surface, density"),
         (&["render", demo, "-o", "a.png", "--set", "surface.layers=1000000000"], "surface.layers"),
         (&["render", demo, "-o", "a.png", "--colormap", "viridi"], "`viridis`"),
         (&["render", demo, "-o", "a.png", "--color-by", "Positoin"], "`Position`"),
@@ -543,6 +543,32 @@ fn bench_of_a_surface_prints_a_line_and_tables() {
 }
 
 #[test]
+fn bench_of_a_density_prints_a_line_and_tables() {
+    let folder = folder("bench-density");
+    let size = ["bench", "density", "--size", "48x32", "--frames", "1"];
+    let args = ["--source", "sim:dam-break?particles=1000", "--json"];
+    let line: Value =
+        serde_json::from_str(&succeeds(&folder, &[&size[..], &args].concat())).unwrap();
+    let stages = ["build", "first_image", "frame", "live", "march", "sim1", "sim2", "step"];
+    assert_eq!(line["ms"].as_object().unwrap().keys().collect::<Vec<_>>(), stages);
+    assert_eq!((&line["method"], &line["particles"]), (&"density".into(), &1000.into()));
+    let count = |name: &str| line["counts"][name].as_u64().unwrap();
+    assert!(count("sim1_updates") > count("sim2_updates") && count("sim2_updates") > 0);
+    let text = succeeds(&folder, &[&size[..], &args[..2]].concat());
+    assert!(text.contains("live") && text.contains(line["hash"].as_str().unwrap()), "{text}");
+    // What does not move has no live frames.
+    let still = ["--source", "demo:dam:2000", "--json"];
+    let line: Value =
+        serde_json::from_str(&succeeds(&folder, &[&size[..], &still].concat())).unwrap();
+    assert!(line["ms"]["live"].is_null() && line["ms"]["sim1"].is_number());
+
+    let text = succeeds(&folder, &[&size[..], &["--scale", "0.01"]].concat());
+    let starts: Vec<_> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    let table1 = ["table1:", "Dataset", "8,000", "27,000", "64,000", "125,000"];
+    assert_eq!(starts, [&table1[..], &["fig5:", "Dataset", "live", "still"]].concat(), "{text}");
+}
+
+#[test]
 fn bench_refuses_what_makes_no_sense() {
     let folder = folder("bench-refusals");
     for (args, word) in [
@@ -555,7 +581,9 @@ fn bench_refuses_what_makes_no_sense() {
         (&["surface", "--stages", "table3"], "'table3'"),
         (&["surface", "--source", "demo:dam:9", "--stages", "shadow16"], "'shadow16'"),
         (&["surface", "--source", "demo:dam:9", "--set", "surface.gap=-1"], "surface.gap"),
-        (&["density"], "not in this version"),
+        (&["density", "--stages", "table2"], "'table2'"),
+        (&["density", "--source", "demo:dam:9", "--stages", "ao16"], "'ao16'"),
+        (&["sections"], "not in this version"),
     ] {
         let said = fails(&folder, &[&["bench"], args].concat(), 2);
         assert!(said.contains(word), "{args:?}: {said}");

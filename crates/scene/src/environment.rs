@@ -20,6 +20,11 @@ pub trait Beyond: Sync {
         self.meet(sight).map(|(_, distance)| distance).filter(|d| d.is_finite())
     }
 
+    /// The environment, if it is nothing else: what sixteen rays may ask themselves, see [`crate::look_sixteen`].
+    fn environment(&self) -> Option<&Environment> {
+        None
+    }
+
     /// Whether something may stand before the medium or in it.
     fn is_amid(&self) -> bool {
         false
@@ -161,6 +166,10 @@ impl Beyond for Environment {
 
     fn look(&self, level: Level, sights: &[Sight], seen: &mut Vec<(Vec3, f32)>) {
         look(self, level, sights, seen);
+    }
+
+    fn environment(&self) -> Option<&Environment> {
+        Some(self)
     }
 }
 

@@ -24,6 +24,7 @@ mod camera;
 mod color;
 mod color_points;
 mod colormap;
+pub mod density;
 mod elements;
 mod environment;
 mod error;
@@ -46,7 +47,7 @@ pub use elements::Element;
 pub use environment::{Beyond, Environment, Equirectangular, Floor, Sight, Sky};
 pub use error::{Result, SceneError, nearest};
 pub use light::{KeyLight, Lamp, Lights, Toward};
-pub use look::exp;
+pub use look::{exp, look_sixteen};
 pub use motion::Moment;
 pub use resolve::{Background, Resolved};
 pub use scene::{

@@ -32,7 +32,6 @@ fn look_all<S: Simd>(
     sights: &[Sight],
     seen: &mut Vec<(Vec3, f32)>,
 ) {
-    let floor = environment.floor.as_ref().map(|floor| (floor, floor_axes(floor)));
     for chunk in sights.chunks(LANES) {
         let mut of = [[0.0_f32; LANES]; 8];
         for lane in 0..LANES {
@@ -49,23 +48,33 @@ fn look_all<S: Simd>(
         let origin = [load(simd, &of[0]), load(simd, &of[1]), load(simd, &of[2])];
         let direction = [load(simd, &of[3]), load(simd, &of[4]), load(simd, &of[5])];
         let cone = [load(simd, &of[6]), load(simd, &of[7])];
-        let (light, distance) = match &floor {
-            Some((floor, axes)) => {
-                with_floor(simd, (&environment.sky, floor, axes), (origin, direction, cone))
-            }
-            None => {
-                let far = f32x16::splat(simd, f32::INFINITY);
-                (sky(simd, &environment.sky, direction), far)
-            }
-        };
+        let (light, distance) = look_sixteen(simd, environment, (origin, direction, cone));
         let mut out = [[0.0_f32; LANES]; 4];
         light[0].store_slice(&mut out[0]);
         light[1].store_slice(&mut out[1]);
         light[2].store_slice(&mut out[2]);
         distance.store_slice(&mut out[3]);
-        for lane in 0..chunk.len() {
-            seen.push((Vec3::new(out[0][lane], out[1][lane], out[2][lane]), out[3][lane]));
+        let [r, g, b, distance] = out;
+        let each = r.into_iter().zip(g).zip(b).zip(distance).take(chunk.len());
+        seen.extend(each.map(|(((r, g), b), distance)| (Vec3::new(r, g, b), distance)));
+    }
+}
+
+/// What sixteen rays with origins, unit directions and cones (width and spread, see [`Sight`]) meet, whatever
+/// their reach: light and distance, which is infinite where there is no floor.
+#[inline(always)]
+pub fn look_sixteen<S: Simd>(
+    simd: S,
+    environment: &Environment,
+    (origin, direction, cone): (Vec3x16<S>, Vec3x16<S>, [f32x16<S>; 2]),
+) -> (Vec3x16<S>, f32x16<S>) {
+    let Environment { sky: above, floor } = environment;
+    match floor {
+        Some(floor) => {
+            let axes = floor_axes(floor);
+            with_floor(simd, (above, floor, &axes), (origin, direction, cone))
         }
+        None => (sky(simd, above, direction), f32x16::splat(simd, f32::INFINITY)),
     }
 }
 
@@ -115,7 +124,7 @@ fn with_floor<S: Simd>(
     // A distant floor is the haze at the horizon.
     let mut level = direction;
     for (level, up) in level.iter_mut().zip(floor.up.to_array()) {
-        *level = *level - along * f32x16::splat(simd, up);
+        *level -= along * f32x16::splat(simd, up);
     }
     let square = level[0] * level[0] + level[1] * level[1] + level[2] * level[2];
     let some = square.simd_gt(f32x16::splat(simd, 1e-20));
@@ -142,9 +151,9 @@ fn tiles<S: Simd>(simd: S, floor: &Floor, (at, wide): ([f32x16<S>; 2], f32x16<S>
     for at in at {
         let at = at * per_tile;
         let even = covered(simd, (at * half, wide * half), 0.5);
-        odd = odd * (even + even - one);
+        odd *= even + even - one;
         let joint = f32x16::splat(simd, 0.5 * JOINT);
-        bare = bare * (one - covered(simd, (at + joint, wide), JOINT));
+        bare *= one - covered(simd, (at + joint, wide), JOINT);
     }
     let second = half - half * odd;
     let dim = one - f32x16::splat(simd, 0.4) * (one - bare);

@@ -72,6 +72,7 @@ impl Scene {
         check_film(&self.film)?;
         check_spheres(&self.spheres)?;
         crate::surface::check(&self.surface)?;
+        crate::density::check(&self.density)?;
         self.sph.check()?;
         check_overlay(&self.overlay)
     }
@@ -321,6 +322,15 @@ mod tests {
             (&["surface.ior=0"], "surface.ior"),
             (&["surface.absorption=1,-1,0"], "surface.absorption"),
             (&["surface.depth=65"], "surface.depth"),
+            (&["density.resolution=3"], "density.resolution"),
+            (&["density.support=0.5"], "density.support"),
+            (&["density.threshold=0"], "density.threshold"),
+            (&["density.saturation=1"], "density.saturation"),
+            (&["density.drop=-1"], "density.drop"),
+            (&["density.depth=0"], "density.depth"),
+            (&["density.ior=inf"], "density.ior"),
+            (&["density.absorption=1,nan,0"], "density.absorption"),
+            (&["density.environment=''"], "density.environment"),
             (&["sph.fps=0"], "sph.fps"),
             (&["sph.cfl=3"], "sph.cfl"),
             (&["sph.density=-1"], "sph.density"),

@@ -6,13 +6,14 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::color::Color;
+use crate::density::Density;
 use crate::settings::{Setting, Shape, settings, words};
 use crate::surface::Surface;
 
 settings! {
     /// All of it: what is seen, from where, in which light, and how the picture is made.
     pub struct Scene {
-        /// The way of seeing: spheres (ray traced) or surface (particles as a liquid).
+        /// The way of seeing: spheres (ray traced), surface (particles as a liquid) or density (a liquid as a field of voxels).
         renderer: Renderer = Renderer::Spheres,
         /// What is seen: one entry per set of particles.
         system: Vec<System> = vec![System::default()],
@@ -28,6 +29,8 @@ settings! {
         spheres: Spheres = Spheres::default(),
         /// The surface renderer.
         surface: Surface = Surface::default(),
+        /// The density renderer.
+        density: Density = Density::default(),
         /// The simulation of liquids, for sim: sources.
         sph: Sph = Sph::default(),
         /// What is drawn over the picture.
@@ -310,6 +313,8 @@ words! {
         Spheres = "spheres",
         /// Particles as a liquid with a smooth surface.
         Surface = "surface",
+        /// Particles as a liquid, by a field of voxels.
+        Density = "density",
     }
 }
 

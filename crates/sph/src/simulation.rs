@@ -381,6 +381,16 @@ impl Simulation {
         frame
     }
 
+    /// Where the particles are now, metres, in the order in which they came.
+    pub fn positions(&self, positions: &mut Vec<[f32; 3]>) {
+        let fluid = &self.fluid;
+        positions.resize(fluid.count, [0.0; 3]);
+        let [x, y, z] = &fluid.position;
+        for (at, id) in fluid.id.iter().enumerate() {
+            positions[*id as usize] = [x[at], y[at], z[at]];
+        }
+    }
+
     /// Goes on from particles of a file, which take the place of all there are.
     ///
     /// # Errors

@@ -7,9 +7,11 @@
 //! - [`spheres_tables`]: Tables 2–9, the sweeps over λ and M, construction (`paper`, `sweeps`)
 //! - [`spheres_source`]: one source, frames of a turning camera (`source`)
 //! - [`surface_tables`], [`surface_source`]: the same for liquids (`surface`)
+//! - [`density_tables`], [`density_source`]: Yasuda et al. 2009 (`density`)
 //! - `draw`: one loop over packets for every way of finding what a ray hits first
 //! - `standard_grid`, `single_ray`: what the paper compares with; they live here only
 
+mod density;
 mod draw;
 mod paper;
 mod sets;
@@ -27,6 +29,9 @@ use std::time::Instant;
 
 use crate::{Error, Result};
 
+pub use density::{
+    SOURCE_STAGES as DENSITY_STAGES, STAGES as DENSITY_TABLES, density_source, density_tables,
+};
 pub use paper::{STAGES as TABLES, Tables, spheres_tables};
 pub use source::{Line, STAGES, Source, peer_view, spheres_source};
 pub use surface::{

@@ -32,7 +32,7 @@ pub struct Source {
     pub scene: Scene,
     /// Frames, and builds, of which the median counts.
     pub frames: usize,
-    /// Names of [`STAGES`] or [`crate::bench::SURFACE_STAGES`]; none: all.
+    /// Names of [`STAGES`], [`crate::bench::SURFACE_STAGES`] or [`crate::bench::DENSITY_STAGES`]; none: all.
     pub stages: Vec<String>,
     /// Threads; none: the machine's.
     pub threads: Option<usize>,
@@ -41,7 +41,7 @@ pub struct Source {
 /// What was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// `spheres` or `surface`.
+    /// `spheres`, `surface` or `density`.
     pub method: &'static str,
     /// The source.
     pub source: String,
@@ -67,7 +67,8 @@ pub struct Line {
     pub bytes: BTreeMap<&'static str, u64>,
     /// Counts of the first frame: `tests` (ray–sphere tests), `spheres` (culled or tested), `tested`. Of a
     /// surface: `kept` (particles), `cells` and `inner` ones, `tiles`, `items` splatted, `spans` stored and
-    /// `true_spans`, refracted `rays` and the `columns` they looked into.
+    /// `true_spans`, refracted `rays` and the `columns` they looked into. Of a density: `voxels`, `drops`, `sim1_updates`
+    /// and `sim2_updates` (voxels written).
     pub counts: BTreeMap<&'static str, u64>,
 }
 

@@ -1,8 +1,8 @@
 //! `motes bench`: the papers' tables, or one line for a source.
 
 use motes::bench::{
-    Line, Source, Table, Tables, peer_view, spheres_source, spheres_tables, surface_defaults,
-    surface_source, surface_tables,
+    Line, Source, Table, Tables, density_source, density_tables, peer_view, spheres_source,
+    spheres_tables, surface_defaults, surface_source, surface_tables,
 };
 use motes::{Error, Scene};
 
@@ -17,19 +17,20 @@ Examples:
   motes bench spheres --scale 0.1 --stages table2,table4 some of them, on smaller sets
   motes bench spheres --source demo:dam:1e6 --peer-view --json
   motes bench surface --scale 0.1 --stages table2,fig8   liquids: the paper's views, on smaller sets
-  motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json";
+  motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json
+  motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
 pub(crate) struct Args {
-    /// The way of seeing: spheres or surface
+    /// The way of seeing: spheres, surface or density
     #[arg(value_name = "METHOD", hide_possible_values = true)]
     method: Method,
     /// Measure this source; without it, the paper's sets
     #[arg(long, value_name = "SOURCE")]
     source: Option<String>,
-    /// Pixels, or 720p, 1080p, 1440p, 4k, 8k [default: 1024x1024; surface: 1080p]
+    /// Pixels, or 720p, 1080p, 1440p, 4k, 8k [default: 1024x1024; surface: 1080p; density: 512x512]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Frames of which the median counts
@@ -61,7 +62,6 @@ pub(crate) struct Args {
 enum Method {
     Spheres,
     Surface,
-    #[value(hide = true)]
     Density,
     #[value(hide = true)]
     Sections,
@@ -76,16 +76,17 @@ impl Method {
     fn size(self) -> [u32; 2] {
         match self {
             Self::Surface => [1920, 1080],
+            Self::Density => [512; 2],
             _ => [1024; 2],
         }
     }
 }
 
 pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
-    if !matches!(args.method, Method::Spheres | Method::Surface) {
+    if args.method == Method::Sections {
         let name = args.method.name();
         return Err(Failure::usage(format!(
-            "bench {name}: not in this version; there are spheres and surface"
+            "bench {name}: not in this version; there are spheres, surface and density"
         )));
     }
     if args.frames == 0 {
@@ -102,6 +103,7 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             };
             let line = match args.method {
                 Method::Surface => surface_source(options, &meter)?,
+                Method::Density => density_source(options, &meter)?,
                 _ => spheres_source(options, &meter)?,
             };
             if args.json { json(&line)? } else { one_line(&line) }
@@ -110,6 +112,7 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             let options = args.tables()?;
             let tables = match args.method {
                 Method::Surface => surface_tables(&options, &meter)?,
+                Method::Density => density_tables(&options, &meter)?,
                 _ => spheres_tables(&options, &meter)?,
             };
             let text = || tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n");
@@ -147,13 +150,13 @@ impl Args {
         })
     }
 
-    /// The scene of a source: one sample per pixel, of a surface no shadows and no occlusion, then what was typed.
+    /// The scene of a source: one sample per pixel, of a liquid no shadows and no occlusion, then what was typed.
     fn scene(&self, source: &str) -> Result<Scene, Failure> {
         let mut scene = Scene::default();
         scene.set_sources(&[source.into()]);
         [scene.image.width, scene.image.height] = self.size.unwrap_or(self.method.size());
         scene.image.samples = 1;
-        if self.method == Method::Surface {
+        if matches!(self.method, Method::Surface | Method::Density) {
             surface_defaults(&mut scene);
         }
         if self.peer_view {

@@ -37,7 +37,7 @@ pub(crate) struct Args {
     /// Pixels, or 720p, 1080p, 1440p, 4k, 8k
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// The way of seeing: spheres or surface
+    /// The way of seeing: spheres, surface or density
     #[arg(long, value_name = "NAME")]
     renderer: Option<String>,
     /// Frame from 0, frames A..B, all or last

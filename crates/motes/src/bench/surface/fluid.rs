@@ -16,13 +16,13 @@ use crate::radius::{self, Rule};
 use crate::{Error, Result, Stats, paint};
 
 /// Particles in memory, in the source's order.
-pub(super) struct Fluid {
+pub(in crate::bench) struct Fluid {
     pub particles: Arc<Particles>,
-    radii: Radii,
+    pub radii: Radii,
     paint: paint::Paint,
     /// The box around the spheres.
     pub bounds: Bounds,
-    mean_radius: f64,
+    pub mean_radius: f64,
     greatest_radius: f64,
     /// How many can be drawn.
     drawable: usize,
@@ -104,7 +104,7 @@ impl Fluid {
     }
 
     /// What has to be drawn of the particles, and the milliseconds to find out.
-    pub fn extract(&self, scene: &Scene) -> Result<(f64, Extracted)> {
+    pub(super) fn extract(&self, scene: &Scene) -> Result<(f64, Extracted)> {
         let resolved = scene.resolve_framing(self.framing())?;
         let liquid = self.liquid(scene, &resolved);
         let (params, mut stats) = (liquid.params(liquid.painted()), Stats::default());
@@ -116,7 +116,7 @@ impl Fluid {
     ///
     /// # Errors
     /// The environment cannot be read.
-    pub fn draw(
+    pub(super) fn draw(
         &self,
         extracted: &Extracted,
         (scene, resolved): (&Scene, &Resolved),

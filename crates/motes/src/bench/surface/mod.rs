@@ -20,6 +20,7 @@ mod views;
 
 use motes_scene::Scene;
 
+pub(super) use fluid::Fluid;
 pub use source::{SOURCE_STAGES, surface_source};
 pub use tables::{STAGES, surface_tables};
 
