@@ -179,7 +179,7 @@ fn see<S: Simd>(simd: S, paths: &Paths<'_>, pixels: &[Pixel]) -> Seen {
             );
             let scattered = f32x16::splat(simd, albedo[c]) * load(simd, &slot.color[c]) * lit;
             light[c] = (left[c] * (one - through)).mul_add_precise(scattered, light[c]);
-            left[c] = left[c] * through;
+            left[c] *= through;
         }
     }
     let (mirrored, reflectance) = mirror(simd, (way, first), 1.0 / ior);
