@@ -106,9 +106,11 @@ fn forces(around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let [a, b, c, ..] = &mut sums;
-    fluid.pressure.fill(0.0);
+    let unit = 1.0 / (physics.density * physics.density);
+    let rows = fluid.pressure.iter_mut().zip(&fluid.warm[0]);
+    rows.for_each(|(pressure, warm)| *pressure = unit * warm);
     let [u, v, w] = &fluid.velocity;
-    let (force, scale) = physics.force();
+    let (force, scale) = physics.force(0.0);
     let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
     around.of(fluid, physics).sum(force, inputs, [&mut a[..n], &mut b[..n], &mut c[..n]]);
     let greatest = accelerate(fluid, physics, ([a, b, c], scale), secs);

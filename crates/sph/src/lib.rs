@@ -34,6 +34,7 @@ mod scenario;
 mod simulation;
 #[cfg(test)]
 mod truths;
+mod virial;
 mod walls;
 mod wcsph;
 

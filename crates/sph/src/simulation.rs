@@ -14,6 +14,7 @@ use crate::kernel::Kernel;
 use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
 use crate::passes::DensityAndMask;
+use crate::virial::transmitted;
 use crate::scenario::Setup;
 use crate::walls::Walls;
 
@@ -355,6 +356,15 @@ impl Simulation {
         let mut sums = std::mem::take(&mut fluid.sums);
         let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
         around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
+        let (density, pressure) = (&sums[0][..n], &mut fluid.pressure);
+        let scale = physics.mass * physics.kernel.value;
+        for (at, pressure) in pressure[..n].iter_mut().enumerate() {
+            *pressure = match physics.sph.solver {
+                Solver::Wcsph => physics.pressure_over_square(scale * (1.0 + density[at])),
+                Solver::Dfsph => fluid.warm[0][at] / (physics.density * physics.density),
+            };
+        }
+        transmitted(around, fluid, physics, &mut sums[7][..n]);
         let mut frame = Frame {
             time: stats.time,
             step: stats.steps,
@@ -364,16 +374,11 @@ impl Simulation {
             pressure: vec![0.0; n],
             masks: vec![[0.0; 6]; n],
         };
-        let scale = physics.mass * physics.kernel.value;
         for (at, id) in fluid.id.iter().map(|id| *id as usize).enumerate() {
             frame.positions[id] = std::array::from_fn(|a| fluid.position[a][at]);
             frame.velocities[id] = std::array::from_fn(|a| fluid.velocity[a][at]);
             frame.density[id] = scale * (1.0 + sums[0][at]);
-            let pressure = match physics.sph.solver {
-                Solver::Wcsph => physics.pressure(frame.density[id]),
-                Solver::Dfsph => fluid.warm[0][at],
-            };
-            frame.pressure[id] = pressure;
+            frame.pressure[id] = sums[7][at];
             let side = |first: usize| [sums[first][at], sums[first + 1][at], sums[first + 2][at]];
             frame.masks[id] = from_sums(side(1), side(4));
         }
