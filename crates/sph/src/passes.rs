@@ -122,7 +122,7 @@ impl Pair<4, 3> for Force {
     #[inline(always)]
     fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], weight: f32x16<S>) -> [f32x16<S>; 3] {
         let [x, y, z] = self.gravity;
-        let rise = (at.d[0] * -x + at.d[1] * -y + at.d[2] * -z).min(i[0]).max(-i[0]);
+        let rise = (at.d[0] * -x + at.d[1] * -y + at.d[2] * -z).min(i[0].abs()).max(-i[0].abs());
         let push = cube(at.w) * weight * (i[0] * self.push + rise);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
     }
@@ -141,12 +141,12 @@ impl Pair<1, 1> for Virial {
 
     #[inline(always)]
     fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], j: [f32x16<S>; 1]) -> [f32x16<S>; 1] {
-        [cube(at.w) * (i[0] + j[0]) * at.d[2]*at.d[2]*3.0]
+        [cube(at.w) * (i[0] + j[0]) * at.square]
     }
 
     #[inline(always)]
     fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], weight: f32x16<S>) -> [f32x16<S>; 1] {
-        [cube(at.w) * (i[0] * self.wall) * weight * at.d[2]*at.d[2]*3.0]
+        [cube(at.w) * (i[0] * self.wall) * weight * at.square]
     }
 }
 

@@ -134,7 +134,7 @@ impl Physics {
         let spacing = f64::from(setup.spacing);
         let kernel = Kernel::new(2.0 * setup.spacing);
         // A lattice at rest has the density at rest.
-        let sum = kernel.lattice_sum(spacing, 2) * f64::from(kernel.value);
+        let sum = kernel.lattice_sum(spacing) * f64::from(kernel.value);
         let mass = sph.density / sum;
         let fall = (2.0 * sph.gravity.length() * f64::from(setup.fall)).sqrt().max(0.1);
         let sound = sph.sound_speed.unwrap_or(10.0 * fall);
@@ -163,7 +163,11 @@ impl Simulation {
         let margin = 0.5 * setup.spacing;
         let lattice =
             Lattice::new(low.map(|v| v - margin), high.map(|v| v + margin), physics.kernel.support);
-        let walls = Walls::new(&setup.solids, setup.spacing, &physics.kernel, &lattice);
+        // wcsph: the wall's part of the density, and pressure with it, grows the faster the nearer the end
+        // of the kernel. That is enough for a wall to answer with no pressure of its own, so that energy
+        // is kept, and nothing comes through. dfsph: walls have a pressure, and are spaced as the liquid.
+        let behind = if sph.solver == Solver::Wcsph { 0.75 } else { 0.5 };
+        let walls = Walls::new((&setup.solids, behind), setup.spacing, &physics.kernel, &lattice);
         let mut fluid = Fluid::default();
         fluid.add(&setup.positions, &setup.velocities);
         let square = |v: &[f32; 3]| v.iter().map(|v| v * v).sum::<f32>();

@@ -24,16 +24,38 @@ fn run(simulation: &mut Simulation, frames: usize, mut each: impl FnMut(usize, &
     }
 }
 
-#[test]
-fn a_column_at_rest_stays() {
-    let setup = setup("column?particles=1024&width=0.5&height=1");
-    let mut simulation = Simulation::new(setup, &sph(Solver::Dfsph, &[]));
+/// The pressure of a column of `layers` particles at rest, from its floor up in bins of a support, over
+/// what bears on them, as a part of ρgh at the floor: the mean over 0.4 s.
+fn hydrostatic_errors(solver: Solver, layers: usize) -> Vec<f64> {
+    let setup = setup(&format!("column?particles={}&width=0.5&height=1", layers * 64));
+    let mut simulation = Simulation::new(setup, &sph(solver, &[]));
     let start = simulation.energy();
-    run(&mut simulation, 25, |frame, s| {
+    let weight = 9810.0 * f64::from(simulation.spacing());
+    let mut bins = vec![0.0; layers / 2];
+    run(&mut simulation, 30, |frame, s| {
         let change = s.energy() / start - 1.0;
-        assert!(change.abs() < 0.01, "{change} at {frame}");
+        assert!(change < 0.005 && change > -0.01, "{solver:?}: {change} at {frame}");
         assert_eq!(s.stats().put_back, 0);
+        let frame_now = s.frame();
+        let mut by_height: Vec<(f32, f32)> =
+            frame_now.positions.iter().map(|p| p[2]).zip(frame_now.pressure).collect();
+        by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (bin, members) in bins.iter_mut().zip(by_height.chunks(128)).filter(|_| frame >= 20) {
+            *bin += members.iter().map(|m| f64::from(m.1)).sum::<f64>() / 1280.0;
+        }
     });
+    let expected = |bin: usize| weight * (layers - 2 * bin - 1) as f64;
+    let errors = bins.iter().enumerate().map(|(bin, p)| (p - expected(bin)) / expected(0));
+    errors.collect()
+}
+
+#[test]
+fn pressure_bears_the_liquid_above() {
+    for solver in [Solver::Dfsph, Solver::Wcsph] {
+        for error in hydrostatic_errors(solver, 16) {
+            assert!(error.abs() < 0.02, "{solver:?}: {error}");
+        }
+    }
 }
 
 /// The surge front of a column a wide and 2a high: T = t √(2g/a), Z = x/a. Martin & Moyce 1952, *An
@@ -102,10 +124,7 @@ fn nothing_is_compressed_gains_energy_or_leaves() {
         ("drop?particles=2000", 20),
         ("fountain?particles=2500", 30),
     ] {
-        let jets = !setup(source).jets.is_empty();
-        // A lone particle of a fast jet is too much for the pressure of wcsph at a wall.
-        let solvers = if jets { &[Solver::Dfsph][..] } else { &[Solver::Dfsph, Solver::Wcsph] };
-        for solver in solvers.iter().copied() {
+        for solver in [Solver::Dfsph, Solver::Wcsph] {
             let mut simulation = Simulation::new(setup(source), &sph(solver, &[]));
             let start = simulation.energy();
             let mut means = vec![];
@@ -160,19 +179,33 @@ fn a_free_drop_keeps_its_momentum() {
 }
 
 #[test]
+fn few_iterations_do() {
+    // A quarter of what accuracy takes, in longer steps: compressed a little, and no more with time.
+    let settings = sph(Solver::Dfsph, &["iterations=3", "cfl=0.6"]);
+    let mut simulation = Simulation::new(setup("dam-break?particles=4000"), &settings);
+    run(&mut simulation, 25, |frame, s| {
+        let densities = s.frame().density;
+        let excess = densities.iter().map(|d| (f64::from(*d) / 1e3 - 1.0).max(0.0));
+        let mean = excess.sum::<f64>() / densities.len() as f64;
+        assert!(mean < 0.03, "{mean} at {frame}");
+        assert_eq!(s.stats().put_back, 0);
+    });
+}
+
+#[test]
 fn the_same_bits_for_any_number_of_threads() {
     for solver in [Solver::Dfsph, Solver::Wcsph] {
         let frame = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let setup = setup("dam-break?particles=3000&ball=0.2");
+                let setup = setup("dam-break?particles=2000&ball=0.2");
                 let mut simulation = Simulation::new(setup, &sph(solver, &["fps=50"]));
                 run(&mut simulation, 4, |_, _| {});
                 simulation.frame()
             })
         };
         let one = frame(1);
-        for threads in 2..=4 {
+        for threads in [2, 3] {
             assert!(frame(threads) == one, "{solver:?}: {threads} threads");
         }
     }
