@@ -32,9 +32,11 @@ const RELAXATION: f32 = 0.3;
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
 /// The part of the places' last pressure that velocities begin with as well: what had to be put right there
-/// is what velocities were not stopped from. Few iterations then do: nothing is forgotten that is wrong
-/// step after step. Where iterations are many, they take back what is too much.
-const FEEDBACK: f32 = 0.5;
+/// is what velocities were not stopped from, and few iterations do if it is not forgotten step after step.
+/// The second where the last step's velocities were left with an error of [`FEEDBACK_FROM`] or more; as
+/// large a part at all times would set liquid at rest swinging.
+const FEEDBACK: [f32; 2] = [0.1, 0.5];
+const FEEDBACK_FROM: f64 = 0.001;
 
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
@@ -56,11 +58,12 @@ impl Simulation {
         // By rate, not by step: what is left over in each of many short steps would add up.
         let share = f64::from(secs) / self.longest_step();
         let tolerance = VELOCITY * share.min(1.0) * self.physics.sph.tolerance;
+        let feedback = FEEDBACK[usize::from(self.unsolved)];
         let (around, fluid, physics, stats) = self.parts();
         factors(around, fluid, physics);
         let acceleration = forces(around, fluid, physics, secs);
         let [velocity, place] = &mut fluid.warm;
-        velocity.iter_mut().zip(place).for_each(|(v, p)| *v += FEEDBACK * *p);
+        velocity.iter_mut().zip(place).for_each(|(v, p)| *v += feedback * *p);
         let first = solve(Aim::Velocity, around, fluid, physics, (secs, tolerance));
         for (row, velocity) in fluid.motion.iter_mut().zip(&fluid.velocity) {
             row.clone_from(velocity);
@@ -69,7 +72,9 @@ impl Simulation {
             solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
         stats.iterations = [stats.iterations[0] + first.0, stats.iterations[1] + second.0];
         stats.compression = second.1;
-        Greatest { acceleration, ..Self::move_on(fluid, physics, secs) }
+        let greatest = Self::move_on(fluid, physics, secs);
+        self.unsolved = first.1 > VELOCITY * share.min(1.0) * FEEDBACK_FROM;
+        Greatest { acceleration, ..greatest }
     }
 }
 

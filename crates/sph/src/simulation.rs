@@ -95,6 +95,8 @@ pub struct Simulation {
     walls: Walls,
     /// The most of v² and a² over the particles in the last step.
     pub(crate) greatest: Greatest,
+    /// Whether velocities were left with a large error ([`crate::dfsph`]).
+    pub(crate) unsolved: bool,
     jets: Vec<Spout>,
     most: usize,
     frames: u64,
@@ -177,6 +179,7 @@ impl Simulation {
         Self {
             stats: Stats { particles: fluid.count, ..Stats::default() },
             greatest: Greatest { speed, ..Greatest::default() },
+            unsolved: false,
             jets: spouts.collect(),
             most: setup.most,
             frames: 0,
