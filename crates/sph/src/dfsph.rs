@@ -208,7 +208,10 @@ fn correct(
     let slope = physics.mass * physics.kernel.slope;
     let rest = physics.density;
     let parts: Vec<f64> = (
-        (fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK), fluid.before[..n].par_chunks_mut(CHUNK)),
+        (
+            fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK),
+            fluid.before[..n].par_chunks_mut(CHUNK),
+        ),
         fluid.pressure[..n].par_chunks_mut(CHUNK),
         (sum[..n].par_chunks(CHUNK), fluid.density[..n].par_chunks(CHUNK)),
         fluid.factor[..n].par_chunks(CHUNK),

@@ -23,7 +23,8 @@ mod fluid;
 mod kernel;
 mod long;
 mod mask;
-#[allow(clippy::needless_range_loop)] // iterators and closures leave the instruction set of a kernel
+#[allow(clippy::needless_range_loop)]
+// iterators and closures leave the instruction set of a kernel
 mod pairs;
 mod passes;
 #[cfg(test)]

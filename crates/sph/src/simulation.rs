@@ -14,8 +14,8 @@ use crate::kernel::Kernel;
 use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
 use crate::passes::DensityAndMask;
-use crate::virial::transmitted;
 use crate::scenario::Setup;
+use crate::virial::transmitted;
 use crate::walls::Walls;
 
 /// A step is never longer, seconds.
