@@ -52,8 +52,8 @@ impl Lattice {
     #[inline(always)]
     pub fn cell(&self, p: [f32; 3]) -> usize {
         let mut cell = 0;
-        for a in 0..3 {
-            let along = ((p[a] - self.low[a]) * self.per_length) as usize;
+        for (a, p) in p.iter().enumerate() {
+            let along = ((p - self.low[a]) * self.per_length) as usize;
             cell += (along.min(self.dims[a] - 3) + 1) * self.strides[a];
         }
         cell

@@ -5,7 +5,7 @@
 //! With ∇W = −C t d (see [`crate::kernel`]) and s = Δt p/ρ², the pressures' work on the velocities is
 //! v_i += m C Σ_j t (s_i + s_j) d, which changes the rate of density of i itself, per s_i, by
 //! −(m C)² (G·(G + G_w) + Σ t² r²), G = Σ t d and G_w its part by walls: their factor α (Eq. 8–11). Each iteration (Alg. 3, 4) is one of Jacobi's:
-//! s_i += ω R_i / (m C)² (…), R the rate to be got rid of:
+//! s_i += ω R_i / (m C)² (…), with [`Momentum`]; R is the rate to be got rid of:
 //!
 //! | solver | R | what it changes |
 //! |---|---|---|
@@ -27,10 +27,16 @@ use crate::passes::{Divergence, Factors, Push};
 use crate::simulation::{Around, Greatest, Physics};
 use crate::wcsph::accelerate;
 
-/// ω: neighbours correct at the same time.
-const RELAXATION: f32 = 0.5;
+/// ω: neighbours correct at the same time, and with momentum (0.5 is too much for that).
+const RELAXATION: f32 = 0.3;
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
+/// The part of the places' last pressure that velocities begin with as well: what had to be put right there
+/// is what velocities were not stopped from, and few iterations do if it is not forgotten step after step.
+/// The second where the last step's velocities were left with an error of [`FEEDBACK_FROM`] or more; as
+/// large a part at all times would set liquid at rest swinging.
+const FEEDBACK: [f32; 2] = [0.1, 0.5];
+const FEEDBACK_FROM: f64 = 0.001;
 
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
@@ -52,9 +58,12 @@ impl Simulation {
         // By rate, not by step: what is left over in each of many short steps would add up.
         let share = f64::from(secs) / self.longest_step();
         let tolerance = VELOCITY * share.min(1.0) * self.physics.sph.tolerance;
+        let feedback = FEEDBACK[usize::from(self.unsolved)];
         let (around, fluid, physics, stats) = self.parts();
         factors(around, fluid, physics);
         let acceleration = forces(around, fluid, physics, secs);
+        let [velocity, place] = &mut fluid.warm;
+        velocity.iter_mut().zip(place).for_each(|(v, p)| *v += feedback * *p);
         let first = solve(Aim::Velocity, around, fluid, physics, (secs, tolerance));
         for (row, velocity) in fluid.motion.iter_mut().zip(&fluid.velocity) {
             row.clone_from(velocity);
@@ -63,7 +72,9 @@ impl Simulation {
             solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
         stats.iterations = [stats.iterations[0] + first.0, stats.iterations[1] + second.0];
         stats.compression = second.1;
-        Greatest { acceleration, ..Self::move_on(fluid, physics, secs) }
+        let greatest = Self::move_on(fluid, physics, secs);
+        self.unsolved = first.1 > VELOCITY * share.min(1.0) * FEEDBACK_FROM;
+        Greatest { acceleration, ..greatest }
     }
 }
 
@@ -106,14 +117,34 @@ fn forces(around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let [a, b, c, ..] = &mut sums;
-    fluid.pressure.fill(0.0);
+    let unit = 1.0 / (physics.density * physics.density);
+    let rows = fluid.pressure.iter_mut().zip(&fluid.warm[0]);
+    rows.for_each(|(pressure, warm)| *pressure = unit * warm);
     let [u, v, w] = &fluid.velocity;
-    let (force, scale) = physics.force();
+    let (force, scale) = physics.force(0.0);
     let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
     around.of(fluid, physics).sum(force, inputs, [&mut a[..n], &mut b[..n], &mut c[..n]]);
     let greatest = accelerate(fluid, physics, ([a, b, c], scale), secs);
     fluid.sums = sums;
     greatest
+}
+
+/// Nesterov's momentum: each iteration goes on by a part of the way that the last one went, more and more,
+/// and begins anew when the error has grown (Nesterov 1983; O'Donoghue & Candès 2015).
+struct Momentum {
+    since: u32,
+    error: f64,
+}
+
+impl Momentum {
+    fn momentum(&self) -> f32 {
+        self.since as f32 / (self.since as f32 + 3.0)
+    }
+
+    fn seen(&mut self, error: f64) {
+        self.since = if error > self.error { 0 } else { self.since + 1 };
+        self.error = error;
+    }
 }
 
 /// One of the two solvers: how many iterations, and the mean error that is left.
@@ -136,10 +167,14 @@ fn solve(
         }
     });
     push(aim, around, fluid, physics);
+    let Fluid { before, warm, .. } = fluid;
+    before.clone_from(&warm[aim as usize]);
     let mut iterations = 0;
     let mut compression;
+    let mut way = Momentum { since: 0, error: f64::INFINITY };
     loop {
-        compression = correct(aim, around, fluid, physics, secs);
+        compression = correct(aim, around, fluid, physics, (secs, way.momentum()));
+        way.seen(compression);
         let enough = iterations >= LEAST && compression <= tolerance;
         if enough || iterations >= u64::from(physics.sph.iterations) {
             break;
@@ -157,7 +192,13 @@ fn solve(
 
 /// Finds what is still to be pushed, and the mean error of the densities without it: too dense, or too
 /// thin where there is pressure. (A start with too much pressure would else not be seen, and add energy.)
-fn correct(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -> f64 {
+fn correct(
+    aim: Aim,
+    around: Around<'_>,
+    fluid: &mut Fluid,
+    physics: &Physics,
+    (secs, momentum): (f32, f32),
+) -> f64 {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let sum = &mut sums[0];
@@ -167,22 +208,27 @@ fn correct(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics, s
     let slope = physics.mass * physics.kernel.slope;
     let rest = physics.density;
     let parts: Vec<f64> = (
-        fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK),
+        (
+            fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK),
+            fluid.before[..n].par_chunks_mut(CHUNK),
+        ),
         fluid.pressure[..n].par_chunks_mut(CHUNK),
         (sum[..n].par_chunks(CHUNK), fluid.density[..n].par_chunks(CHUNK)),
         fluid.factor[..n].par_chunks(CHUNK),
     )
         .into_par_iter()
-        .map(|(total, s, (sum, density), factor)| {
+        .map(|((total, before), s, (sum, density), factor)| {
             let mut excess = 0.0;
             for i in 0..total.len() {
                 let excess_now = density[i] - rest;
                 let counted = if aim == Aim::Place { excess_now } else { excess_now.min(0.0) };
                 let rate = counted / secs - slope * sum[i];
                 let next = (total[i] + RELAXATION * rate * factor[i]).max(0.0);
-                s[i] = next - total[i];
-                excess += f64::from((s[i] / (RELAXATION * factor[i]) * secs / rest).abs());
-                total[i] = next;
+                let error = (next - total[i]) / (RELAXATION * factor[i]) * secs / rest;
+                excess += f64::from(error.abs());
+                let further = (next + momentum * (next - before[i])).max(0.0);
+                s[i] = further - total[i];
+                (before[i], total[i]) = (next, further);
             }
             excess
         })

@@ -31,19 +31,18 @@ impl Kernel {
         w.powi(4) * (5.0 - 4.0 * w)
     }
 
-    /// Σ W / A over the points of a cubic lattice of `spacing`, seen from one of them. `layers` is how
-    /// many layers to each side there are along the third axis: 0 for a plane.
-    pub fn lattice_sum(&self, spacing: f64, layers: i32) -> f64 {
+    /// Σ W / A over a square lattice of `spacing`, seen from `away` above one of its points.
+    pub fn plane_sum(&self, spacing: f64, away: f64) -> f64 {
         let reach = (f64::from(self.support) / spacing).ceil() as i32;
-        let mut sum = 0.0;
-        for z in -layers.min(reach)..=layers.min(reach) {
-            for y in -reach..=reach {
-                for x in -reach..=reach {
-                    sum += self.shape(spacing * f64::from(x * x + y * y + z * z).sqrt());
-                }
-            }
-        }
-        sum
+        let line = || (-reach..=reach).map(|i| (f64::from(i) * spacing).powi(2));
+        let squares = line().flat_map(|y| line().map(move |x| x + y));
+        squares.map(|square| self.shape((square + away * away).sqrt())).sum()
+    }
+
+    /// Σ W / A over a cubic lattice of `spacing`, seen from one of its points.
+    pub fn lattice_sum(&self, spacing: f64) -> f64 {
+        let reach = (f64::from(self.support) / spacing).ceil() as i32;
+        (-reach..=reach).map(|z| self.plane_sum(spacing, f64::from(z) * spacing)).sum()
     }
 }
 

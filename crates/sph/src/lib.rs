@@ -17,13 +17,14 @@
 //! - The same setup and settings give the same bits for any number of threads.
 //! - SI units throughout.
 
-#![allow(clippy::needless_range_loop)] // closures and iterators leave the instruction set of a kernel
-
 mod cells;
 mod dfsph;
 mod fluid;
 mod kernel;
+mod long;
 mod mask;
+#[allow(clippy::needless_range_loop)]
+// iterators and closures leave the instruction set of a kernel
 mod pairs;
 mod passes;
 #[cfg(test)]
@@ -34,9 +35,11 @@ mod scenario;
 mod simulation;
 #[cfg(test)]
 mod truths;
+mod virial;
 mod walls;
 mod wcsph;
 
+pub use long::Extremes;
 pub use mask::{Mask, masks};
 pub use scenario::{Jet, Parameter, SCENARIOS, Scenario, Setup};
 pub use simulation::{Frame, Simulation, Stats};

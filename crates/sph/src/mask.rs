@@ -40,9 +40,9 @@ fn mask_at(grid: &Grid, support: f32, slot: usize) -> Mask {
         let square = way.iter().map(|v| v * v).sum::<f32>();
         let near = 1.0 - square.sqrt() / support;
         if square > 0.0 && near > 0.0 {
-            for axis in 0..3 {
-                let side = 2 * axis + usize::from(way[axis] < 0.0);
-                sides[side] += way[axis] * way[axis] / square * near;
+            for (axis, along) in way.iter().enumerate() {
+                let side = 2 * axis + usize::from(*along < 0.0);
+                sides[side] += along * along / square * near;
             }
         }
     });

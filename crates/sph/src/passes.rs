@@ -89,10 +89,18 @@ impl Pair<0, 8> for Factors {
 ///
 /// Numbers: P = p/ρ², and the velocity. Viscosity is the Laplacian of Brookshaw 1985, for this kernel
 /// without a division: 2ν m/ρ Σ (v_i − v_j) (d·∇W)/r² = −2ν m/ρ C Σ t (v_i − v_j).
+///
+/// The pressure in a wall is that of liquid at rest which goes on behind it, P_b = P_i − g·d/ρ₀ (Adami et
+/// al. 2012, Eq. 27), though no further from P_i than P_i itself: none where liquid falls freely along it.
+/// Without, liquid beside a wall lacks the neighbours that would bear it, and the rest bears more.
 #[derive(Clone, Copy)]
 pub(crate) struct Force {
     /// 2ν/ρ.
     pub viscosity: f32,
+    /// 1, or 0 where only P_b − P_i is to act ([`crate::dfsph`]).
+    pub push: f32,
+    /// g/ρ₀.
+    pub gravity: [f32; 3],
 }
 
 impl Pair<4, 3> for Force {
@@ -101,7 +109,7 @@ impl Pair<4, 3> for Force {
     #[inline(always)]
     fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], j: [f32x16<S>; 4]) -> [f32x16<S>; 3] {
         let t = cube(at.w);
-        let push = t * (i[0] + j[0]);
+        let push = t * ((i[0] + j[0]) * self.push);
         let drag = t * -self.viscosity;
         let [u, v, w] = [i[1] - j[1], i[2] - j[2], i[3] - j[3]];
         [
@@ -113,8 +121,32 @@ impl Pair<4, 3> for Force {
 
     #[inline(always)]
     fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], weight: f32x16<S>) -> [f32x16<S>; 3] {
-        let push = cube(at.w) * weight * i[0];
+        let [x, y, z] = self.gravity;
+        let rise = (at.d[0] * -x + at.d[1] * -y + at.d[2] * -z).min(i[0].abs()).max(-i[0].abs());
+        let push = cube(at.w) * weight * (i[0] * self.push + rise);
         [push * at.d[0], push * at.d[1], push * at.d[2]]
+    }
+}
+
+/// Σ t (P_i + P_j) r²: what pressures P = p/ρ² pass on between neighbours (the trace of the virial),
+/// over m C.
+#[derive(Clone, Copy)]
+pub(crate) struct Virial {
+    /// How much of the particle's own pressure a wall answers with.
+    pub wall: f32,
+}
+
+impl Pair<1, 1> for Virial {
+    const SIGN: [f32; 1] = [1.0];
+
+    #[inline(always)]
+    fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], j: [f32x16<S>; 1]) -> [f32x16<S>; 1] {
+        [cube(at.w) * (i[0] + j[0]) * at.square]
+    }
+
+    #[inline(always)]
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 1], weight: f32x16<S>) -> [f32x16<S>; 1] {
+        [cube(at.w) * (i[0] * self.wall) * weight * at.square]
     }
 }
 

@@ -11,6 +11,7 @@ use crate::random::{points, uniform};
 use crate::walls::{Solid, Walls};
 
 const SUPPORT: f32 = 0.11;
+const FORCE: Force = Force { viscosity: 0.02, push: 1.0, gravity: [0.5, -0.1, -2.0] };
 
 /// Particles in a box with walls, in cell order, with four numbers each.
 struct Case {
@@ -35,7 +36,7 @@ impl Case {
             *row = sorted;
         }
         let solids = [Solid::Box([0.0; 3], size), Solid::Ball([0.4, 0.25, 0.2], 0.1)];
-        let walls = Walls::new(&solids, 0.5 * SUPPORT, &Kernel::new(SUPPORT), &lattice);
+        let walls = Walls::new((&solids, 0.5), 0.5 * SUPPORT, &Kernel::new(SUPPORT), &lattice);
         let inputs = std::array::from_fn(|k| {
             (0..padded(count)).map(|i| uniform(9 + k as u64, i as u64) - 0.4).collect()
         });
@@ -153,7 +154,7 @@ fn passes_are_sums_over_all_pairs() {
 #[test]
 fn forces_are_sums_over_all_pairs() {
     let case = Case::new(1200);
-    let force = Force { viscosity: 0.02 };
+    let force = FORCE;
     let slow = case.slow(
         |d, w, i, j| {
             let t = w.powi(3);
@@ -162,7 +163,10 @@ fn forces_are_sums_over_all_pairs() {
                 t * ((i[0] + j[0]) * d[a] - drag)
             })
         },
-        |d, w, i, weight| d.map(|d| w.powi(3) * weight * i[0] * d),
+        |d, w, i, weight| {
+            let rise = -(0..3).map(|a| f64::from(FORCE.gravity[a]) * d[a]).sum::<f64>();
+            d.map(|d| w.powi(3) * weight * (i[0] + rise.clamp(-i[0].abs(), i[0].abs())) * d)
+        },
     );
     assert_near(&case.fast(force, Level::new()), &slow, TOLERANCE);
 }
@@ -204,7 +208,7 @@ fn masks_are_sums_over_all_pairs() {
 #[test]
 fn instruction_sets_and_numbers_of_threads_agree() {
     let case = Case::new(1500);
-    let force = Force { viscosity: 0.02 };
+    let force = FORCE;
     let fast = case.fast(force, Level::new());
     let plain = case.fast(force, Level::baseline());
     let wide: Vec<[f64; 3]> = plain.iter().map(|s| s.map(f64::from)).collect();

@@ -15,6 +15,7 @@ use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
 use crate::passes::DensityAndMask;
 use crate::scenario::Setup;
+use crate::virial::transmitted;
 use crate::walls::Walls;
 
 /// A step is never longer, seconds.
@@ -94,6 +95,8 @@ pub struct Simulation {
     walls: Walls,
     /// The most of v² and a² over the particles in the last step.
     pub(crate) greatest: Greatest,
+    /// Whether velocities were left with a large error ([`crate::dfsph`]).
+    pub(crate) unsolved: bool,
     jets: Vec<Spout>,
     most: usize,
     frames: u64,
@@ -133,7 +136,7 @@ impl Physics {
         let spacing = f64::from(setup.spacing);
         let kernel = Kernel::new(2.0 * setup.spacing);
         // A lattice at rest has the density at rest.
-        let sum = kernel.lattice_sum(spacing, 2) * f64::from(kernel.value);
+        let sum = kernel.lattice_sum(spacing) * f64::from(kernel.value);
         let mass = sph.density / sum;
         let fall = (2.0 * sph.gravity.length() * f64::from(setup.fall)).sqrt().max(0.1);
         let sound = sph.sound_speed.unwrap_or(10.0 * fall);
@@ -162,7 +165,11 @@ impl Simulation {
         let margin = 0.5 * setup.spacing;
         let lattice =
             Lattice::new(low.map(|v| v - margin), high.map(|v| v + margin), physics.kernel.support);
-        let walls = Walls::new(&setup.solids, setup.spacing, &physics.kernel, &lattice);
+        // wcsph: the wall's part of the density, and pressure with it, grows the faster the nearer the end
+        // of the kernel. That is enough for a wall to answer with no pressure of its own, so that energy
+        // is kept, and nothing comes through. dfsph: walls have a pressure, and are spaced as the liquid.
+        let behind = if sph.solver == Solver::Wcsph { 0.75 } else { 0.5 };
+        let walls = Walls::new((&setup.solids, behind), setup.spacing, &physics.kernel, &lattice);
         let mut fluid = Fluid::default();
         fluid.add(&setup.positions, &setup.velocities);
         let square = |v: &[f32; 3]| v.iter().map(|v| v * v).sum::<f32>();
@@ -172,6 +179,7 @@ impl Simulation {
         Self {
             stats: Stats { particles: fluid.count, ..Stats::default() },
             greatest: Greatest { speed, ..Greatest::default() },
+            unsolved: false,
             jets: spouts.collect(),
             most: setup.most,
             frames: 0,
@@ -355,6 +363,15 @@ impl Simulation {
         let mut sums = std::mem::take(&mut fluid.sums);
         let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
         around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
+        let (density, pressure) = (&sums[0][..n], &mut fluid.pressure);
+        let scale = physics.mass * physics.kernel.value;
+        for (at, pressure) in pressure[..n].iter_mut().enumerate() {
+            *pressure = match physics.sph.solver {
+                Solver::Wcsph => physics.pressure_over_square(scale * (1.0 + density[at])),
+                Solver::Dfsph => fluid.warm[0][at] / (physics.density * physics.density),
+            };
+        }
+        transmitted(around, fluid, physics, &mut sums[7][..n]);
         let mut frame = Frame {
             time: stats.time,
             step: stats.steps,
@@ -364,16 +381,11 @@ impl Simulation {
             pressure: vec![0.0; n],
             masks: vec![[0.0; 6]; n],
         };
-        let scale = physics.mass * physics.kernel.value;
         for (at, id) in fluid.id.iter().map(|id| *id as usize).enumerate() {
             frame.positions[id] = std::array::from_fn(|a| fluid.position[a][at]);
             frame.velocities[id] = std::array::from_fn(|a| fluid.velocity[a][at]);
             frame.density[id] = scale * (1.0 + sums[0][at]);
-            let pressure = match physics.sph.solver {
-                Solver::Wcsph => physics.pressure(frame.density[id]),
-                Solver::Dfsph => fluid.warm[0][at],
-            };
-            frame.pressure[id] = pressure;
+            frame.pressure[id] = sums[7][at];
             let side = |first: usize| [sums[first][at], sums[first + 1][at], sums[first + 2][at]];
             frame.masks[id] = from_sums(side(1), side(4));
         }

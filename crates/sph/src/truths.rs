@@ -24,16 +24,38 @@ fn run(simulation: &mut Simulation, frames: usize, mut each: impl FnMut(usize, &
     }
 }
 
-#[test]
-fn a_column_at_rest_stays() {
-    let setup = setup("column?particles=1024&width=0.5&height=1");
-    let mut simulation = Simulation::new(setup, &sph(Solver::Dfsph, &[]));
+/// The pressure of a column of `layers` particles at rest, from its floor up in bins of a support, over
+/// what bears on them, as a part of ρgh at the floor: the mean over 0.4 s.
+fn hydrostatic_errors(solver: Solver, layers: usize) -> Vec<f64> {
+    let setup = setup(&format!("column?particles={}&width=0.5&height=1", layers * 64));
+    let mut simulation = Simulation::new(setup, &sph(solver, &[]));
     let start = simulation.energy();
-    run(&mut simulation, 25, |frame, s| {
+    let weight = 9810.0 * f64::from(simulation.spacing());
+    let mut bins = vec![0.0; layers / 2];
+    run(&mut simulation, 30, |frame, s| {
         let change = s.energy() / start - 1.0;
-        assert!(change.abs() < 0.01, "{change} at {frame}");
+        assert!(change < 0.005 && change > -0.01, "{solver:?}: {change} at {frame}");
         assert_eq!(s.stats().put_back, 0);
+        let frame_now = s.frame();
+        let mut by_height: Vec<(f32, f32)> =
+            frame_now.positions.iter().map(|p| p[2]).zip(frame_now.pressure).collect();
+        by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (bin, members) in bins.iter_mut().zip(by_height.chunks(128)).filter(|_| frame >= 20) {
+            *bin += members.iter().map(|m| f64::from(m.1)).sum::<f64>() / 1280.0;
+        }
     });
+    let expected = |bin: usize| weight * (layers - 2 * bin - 1) as f64;
+    let errors = bins.iter().enumerate().map(|(bin, p)| (p - expected(bin)) / expected(0));
+    errors.collect()
+}
+
+#[test]
+fn pressure_bears_the_liquid_above() {
+    for solver in [Solver::Dfsph, Solver::Wcsph] {
+        for error in hydrostatic_errors(solver, 16) {
+            assert!(error.abs() < 0.02, "{solver:?}: {error}");
+        }
+    }
 }
 
 /// The surge front of a column a wide and 2a high: T = t √(2g/a), Z = x/a. Martin & Moyce 1952, *An
@@ -57,9 +79,9 @@ const MARTIN_MOYCE: [(f64, f64); 15] = [
     (3.33, 4.11),
 ];
 
-/// The greatest and the mean error of the front as a part of Z, after the best shift in time: the
-/// gate of the experiment takes a while to open.
-fn front_errors(solver: Solver, particles: &str) -> (f64, f64) {
+/// The greatest and the mean error of the front as a part of Z, after the best shift in time, and that
+/// shift as T: the gate of the experiment takes a while to open.
+fn front_errors(solver: Solver, particles: &str) -> (f64, f64, f64) {
     let source = format!(
         "dam-break?particles={particles}&length=1&height=2&width=0.5&tank_length=6&tank_height=2.5"
     );
@@ -78,7 +100,7 @@ fn front_errors(solver: Solver, particles: &str) -> (f64, f64) {
     };
     let errors = |shift: f64| {
         let each = MARTIN_MOYCE.map(|(t, z)| (at((t - shift).max(0.0)) / z - 1.0).abs());
-        (each.iter().copied().fold(0.0, f64::max), each.iter().sum::<f64>() / 15.0)
+        (each.iter().copied().fold(0.0, f64::max), each.iter().sum::<f64>() / 15.0, shift)
     };
     let tried = (-40..=80).map(|i| errors(f64::from(i) * 0.01));
     tried.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
@@ -86,10 +108,13 @@ fn front_errors(solver: Solver, particles: &str) -> (f64, f64) {
 
 #[test]
 fn a_dam_breaks_as_martin_and_moyce_saw() {
-    let coarse = front_errors(Solver::Dfsph, "512");
-    let fine = front_errors(Solver::Dfsph, "4096");
-    assert!(fine.0 < 0.1, "{fine:?}");
-    assert!(fine.1 < coarse.1, "{fine:?} {coarse:?}");
+    let [coarse, middle, fine] =
+        ["512", "1728", "4096"].map(|particles| front_errors(Solver::Dfsph, particles));
+    assert!(fine.0 < 0.1 && fine.1 < 0.02, "{fine:?}");
+    // What is left is the experiment's own scatter, and its gate at the first reading; the front itself
+    // comes closer to one path with more particles.
+    let [first, second] = [middle.2 - coarse.2, fine.2 - middle.2].map(f64::abs);
+    assert!(second < first, "{coarse:?} {middle:?} {fine:?}");
     let weakly = front_errors(Solver::Wcsph, "1728");
     assert!(weakly.0 < 0.1, "{weakly:?}");
 }
@@ -102,10 +127,7 @@ fn nothing_is_compressed_gains_energy_or_leaves() {
         ("drop?particles=2000", 20),
         ("fountain?particles=2500", 30),
     ] {
-        let jets = !setup(source).jets.is_empty();
-        // A lone particle of a fast jet is too much for the pressure of wcsph at a wall.
-        let solvers = if jets { &[Solver::Dfsph][..] } else { &[Solver::Dfsph, Solver::Wcsph] };
-        for solver in solvers.iter().copied() {
+        for solver in [Solver::Dfsph, Solver::Wcsph] {
             let mut simulation = Simulation::new(setup(source), &sph(solver, &[]));
             let start = simulation.energy();
             let mut means = vec![];
@@ -160,19 +182,46 @@ fn a_free_drop_keeps_its_momentum() {
 }
 
 #[test]
+fn a_loose_tolerance_does() {
+    // A quarter of the work, in longer steps: compressed a little, and no more with time.
+    let settings = sph(Solver::Dfsph, &["tolerance=0.01", "cfl=0.6"]);
+    let mut simulation = Simulation::new(setup("dam-break?particles=3000"), &settings);
+    let most = simulation.endure(1.0, &mut |_| true).unwrap();
+    assert!(most.compression < 0.03, "{most:?}");
+    assert_eq!(simulation.stats().put_back, 0);
+}
+
+#[test]
+fn a_long_run_stays_bounded() {
+    for solver in [Solver::Dfsph, Solver::Wcsph] {
+        let setup = setup("double-dam-break?particles=500");
+        let fall = f64::from(setup.fall);
+        let mut simulation = Simulation::new(setup, &sph(solver, &[]));
+        let start = simulation.energy();
+        let most = simulation.endure(6.0, &mut |_| true).unwrap();
+        assert!((simulation.stats().time - 6.0).abs() < 1e-6);
+        assert!(most.energy <= 1.005 * start, "{solver:?}: {most:?}");
+        // Where streams meet, a jet rises faster than what fell.
+        assert!(most.speed < 2.5 * (2.0 * 9.81 * fall).sqrt(), "{solver:?}: {most:?}");
+        assert!(most.compression < 0.02, "{solver:?}: {most:?}");
+        assert_eq!(simulation.stats().put_back, 0, "{solver:?}");
+    }
+}
+
+#[test]
 fn the_same_bits_for_any_number_of_threads() {
     for solver in [Solver::Dfsph, Solver::Wcsph] {
         let frame = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let setup = setup("dam-break?particles=3000&ball=0.2");
+                let setup = setup("dam-break?particles=2000&ball=0.2");
                 let mut simulation = Simulation::new(setup, &sph(solver, &["fps=50"]));
                 run(&mut simulation, 4, |_, _| {});
                 simulation.frame()
             })
         };
         let one = frame(1);
-        for threads in 2..=4 {
+        for threads in [2, 3] {
             assert!(frame(threads) == one, "{solver:?}: {threads} threads");
         }
     }

@@ -4,7 +4,8 @@
 //! ψ_b = γ ρ₀ / Σ_k W(x_b − x_k) (Akinci et al. 2012, §3, Eq. 4–5). γ is such that a sample of a plane
 //! sampled at the particles' spacing weighs as much as a particle: a lattice of particles at rest then
 //! keeps its density up to the wall. Samples lie half a spacing behind the surface, so that particles at
-//! rest touch it.
+//! rest touch it; or further, and are the heavier, so that their sum over a plane, as those particles see it,
+//! is the same.
 
 use crate::cells::{Lattice, Order};
 use crate::kernel::Kernel;
@@ -31,9 +32,15 @@ pub(crate) struct Walls {
 }
 
 impl Walls {
-    pub fn new(solids: &[Solid], spacing: f32, kernel: &Kernel, lattice: &Lattice) -> Self {
+    /// Samples of `solids`, `behind` spacings behind their surfaces.
+    pub fn new(
+        (solids, behind): (&[Solid], f32),
+        spacing: f32,
+        kernel: &Kernel,
+        lattice: &Lattice,
+    ) -> Self {
         let points: Vec<[f32; 3]> =
-            solids.iter().flat_map(|solid| sample(*solid, spacing)).collect();
+            solids.iter().flat_map(|solid| sample(*solid, behind * spacing, spacing)).collect();
         let count = points.len();
         let mut rows: [Vec<f32>; 3] =
             std::array::from_fn(|a| points.iter().map(|p| p[a]).collect());
@@ -49,7 +56,7 @@ impl Walls {
         walls.near = (0..lattice.cells())
             .map(|cell| walls.runs(lattice, cell).any(|(from, to)| to > from))
             .collect();
-        walls.weigh(f64::from(spacing), kernel, lattice);
+        walls.weigh(f64::from(spacing), f64::from(behind), kernel, lattice);
         walls
     }
 
@@ -75,8 +82,9 @@ impl Walls {
         })
     }
 
-    fn weigh(&mut self, spacing: f64, kernel: &Kernel, lattice: &Lattice) {
-        let full = kernel.lattice_sum(spacing, 0);
+    fn weigh(&mut self, spacing: f64, behind: f64, kernel: &Kernel, lattice: &Lattice) {
+        let plane = |away: f64| kernel.plane_sum(spacing, away * spacing);
+        let full = plane(0.0) * plane(1.0) / plane(0.5 + behind);
         let point = |i: usize| -> [f32; 3] { std::array::from_fn(|a| self.rows[a][i]) };
         let weights: Vec<f32> = (0..self.count())
             .map(|i| {
@@ -97,16 +105,16 @@ impl Walls {
 }
 
 /// Points half a spacing behind the surface.
-fn sample(solid: Solid, spacing: f32) -> Vec<[f32; 3]> {
+fn sample(solid: Solid, behind: f32, spacing: f32) -> Vec<[f32; 3]> {
     match solid {
-        Solid::Box(low, high) => sample_box(low, high, spacing),
-        Solid::Ball(center, radius) => sample_ball(center, radius - 0.5 * spacing, spacing),
+        Solid::Box(low, high) => {
+            sample_box(low.map(|v| v - behind), high.map(|v| v + behind), spacing)
+        }
+        Solid::Ball(center, radius) => sample_ball(center, radius - behind, spacing),
     }
 }
 
 fn sample_box(low: [f32; 3], high: [f32; 3], spacing: f32) -> Vec<[f32; 3]> {
-    let low = low.map(|v| v - 0.5 * spacing);
-    let high = high.map(|v| v + 0.5 * spacing);
     let counts: [u32; 3] =
         std::array::from_fn(|a| ((high[a] - low[a]) / spacing).round().max(1.0) as u32);
     let along = |a: usize, i: u32| low[a] + (high[a] - low[a]) * i as f32 / counts[a] as f32;
@@ -151,7 +159,7 @@ mod tests {
         let (low, high, spacing) = ([0.0; 3], [1.0, 1.0, 1.0], 0.1);
         let kernel = Kernel::new(0.2);
         let lattice = Lattice::new([-0.05; 3], [1.05; 3], 0.2);
-        let walls = Walls::new(&[Solid::Box(low, high)], spacing, &kernel, &lattice);
+        let walls = Walls::new((&[Solid::Box(low, high)], 0.5), spacing, &kernel, &lattice);
         assert_eq!(walls.count(), 12usize.pow(3) - 10usize.pow(3));
         let mut planes = 0;
         for i in 0..walls.count() {
@@ -173,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_ball_is_sampled_at_the_spacing() {
-        let points = sample(Solid::Ball([1.0, 2.0, 3.0], 1.05), 0.1);
+        let points = sample(Solid::Ball([1.0, 2.0, 3.0], 1.05), 0.05, 0.1);
         assert_eq!(points.len(), (4.0 * std::f32::consts::PI * 100.0).ceil() as usize);
         for p in points {
             let r = ((p[0] - 1.0).powi(2) + (p[1] - 2.0).powi(2) + (p[2] - 3.0).powi(2)).sqrt();

@@ -20,11 +20,16 @@ impl Physics {
         (self.sound * self.sound * self.density / 7.0 * (seventh - 1.0)).max(0.0)
     }
 
-    /// The pass of forces, and the factor on its sums.
-    pub(crate) fn force(&self) -> (Force, f32) {
+    /// p/ρ² by the equation of state.
+    pub(crate) fn pressure_over_square(&self, density: f32) -> f32 {
+        self.pressure(density) / (density * density)
+    }
+
+    /// The pass of forces, of the pressures as a whole (1) or of walls alone (0); the factor on its sums.
+    pub(crate) fn force(&self, push: f32) -> (Force, f32) {
         let scale = self.mass * self.kernel.slope;
-        let force = Force { viscosity: 2.0 * self.viscosity / self.density };
-        (force, scale)
+        let viscosity = 2.0 * self.viscosity / self.density;
+        (Force { viscosity, push, gravity: self.gravity.map(|g| g / self.density) }, scale)
     }
 }
 
@@ -48,7 +53,7 @@ impl Simulation {
                 let mut excess = 0.0;
                 for ((density, pressure), sum) in densities.iter_mut().zip(pressures).zip(sums) {
                     *density = scale * (1.0 + sum);
-                    *pressure = physics.pressure(*density) / (*density * *density);
+                    *pressure = physics.pressure_over_square(*density);
                     excess += f64::from((*density / physics.density - 1.0).max(0.0));
                 }
                 excess
@@ -57,7 +62,7 @@ impl Simulation {
         stats.compression = parts.iter().sum::<f64>() / n.max(1) as f64;
 
         let [u, v, w] = &fluid.velocity;
-        let (force, scale) = physics.force();
+        let (force, scale) = physics.force(1.0);
         let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
         let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
         around.of(fluid, physics).sum(force, inputs, outputs);
