@@ -12,7 +12,7 @@ use crate::Surfaces;
 use crate::blocks::Blocks;
 use crate::march::{Hit, Ray, march, march_blocks};
 use crate::refract::{FAINT, PART, Paths};
-use crate::shade::{Pixel, key_on};
+use crate::shade::{Pixel, Work, key_on};
 
 /// Most media of a picture.
 pub const MOST_MEDIA: usize = 8;
@@ -32,6 +32,16 @@ pub struct Medium<'a> {
 pub(crate) struct Passage<'a> {
     pub medium: Medium<'a>,
     pub blocks: Option<Blocks>,
+}
+
+impl Passage<'_> {
+    /// What a ray meets first, and the number of columns it went through.
+    fn march(&self, ray: &Ray) -> (Option<Hit>, u32) {
+        match &self.blocks {
+            Some(blocks) => march_blocks((self.medium.surfaces, blocks), ray),
+            None => march(self.medium.surfaces, ray),
+        }
+    }
 }
 
 /// The media that something is in: bit m for medium m.
@@ -175,10 +185,7 @@ impl Paths<'_> {
         let split = optics::split(pixel.direction, surfaces.normal(surface), 1.0 / ior);
         let reflected = Path { direction: split.reflected, ..path };
         if split.reflectance < FAINT {
-            let reach = f32::INFINITY;
-            let direction = split.reflected;
-            let sight = Sight { origin, direction, reach, width: 0.0, spread: PART };
-            self.look(pixel, sight, Vec3::splat(split.reflectance));
+            self.glance(pixel, (origin, split.reflected), split.reflectance);
         } else {
             self.follow_media(reflected, split.reflectance, pixel);
         }
@@ -189,23 +196,24 @@ impl Paths<'_> {
         Vec4::W
     }
 
+    /// What a ray meets first of a medium.
+    pub(crate) fn march(&mut self, medium: usize, ray: &Ray) -> Option<Hit> {
+        let (hit, columns) = self.media[medium].march(ray);
+        self.work = self.work + Work { rays: 1, columns: columns.into() };
+        hit
+    }
+
     /// What a path meets first: the medium and the surface.
     fn march_media(&mut self, path: &Path) -> Option<(usize, Hit)> {
         let mut nearest: Option<(usize, Hit)> = None;
-        for (m, passage) in self.media.iter().enumerate() {
+        for m in 0..self.media.len() {
             let ray = Ray {
                 origin: path.origin,
                 direction: path.direction,
                 inside: path.within.holds(m),
                 from: path.from.filter(|from| from.0 == m).map(|from| from.1),
             };
-            let surfaces = passage.medium.surfaces;
-            let (hit, columns) = match &passage.blocks {
-                Some(blocks) => march_blocks((surfaces, blocks), &ray),
-                None => march(surfaces, &ray),
-            };
-            self.work.rays += 1;
-            self.work.columns += u64::from(columns);
+            let hit = self.march(m, &ray);
             let nearer = |h: &Hit| nearest.is_none_or(|(_, n)| h.distance < n.distance);
             if let Some(hit) = hit.filter(nearer) {
                 nearest = Some((m, hit));

@@ -4,7 +4,6 @@
 //! looked up in the columns they lie in. As these hold many layers, nothing is hidden from the test.
 
 use glam::Vec3;
-use motes_scene::Projection;
 
 use crate::Surfaces;
 
@@ -62,22 +61,12 @@ fn turned([x, y]: [usize; 2]) -> (Vec3, Vec3, Vec3) {
 
 /// Whether a point lies in the liquid, as far as the view's columns tell.
 fn is_inside(surfaces: &Surfaces, point: Vec3) -> bool {
-    let (rays, size) = (&surfaces.view.rays, surfaces.view.size);
-    let v = point - rays.origin;
-    let z = v.dot(rays.forward);
-    let scale = match rays.projection {
-        Projection::Perspective => 1.0 / (rays.pixel * z),
-        Projection::Orthographic => 1.0 / rays.pixel,
-    };
-    let x = rays.center[0] + v.dot(rays.right) * scale;
-    let y = rays.center[1] - v.dot(rays.up) * scale;
+    let (view, size) = (&surfaces.view, surfaces.view.size);
+    let ([x, y], z) = view.place(point);
     if !(x >= 0.0 && y >= 0.0 && x < size.0 as f32 && y < size.1 as f32) || z <= 0.0 {
         return false;
     }
-    let nearness = match rays.projection {
-        Projection::Perspective => 1.0 / z,
-        Projection::Orthographic => -z,
-    };
+    let nearness = view.nearness(z);
     let column = surfaces.of(y as usize * size.0 as usize + x as usize);
     let before = surfaces.nearness[column].iter().filter(|n| **n > nearness).count();
     before % 2 == 1

@@ -9,8 +9,7 @@ use glam::{Vec3, Vec4};
 use motes_scene::{Sight, optics};
 
 use crate::Surfaces;
-use crate::blocks::Blocks;
-use crate::march::{Hit, Ray, march, march_blocks};
+use crate::march::Ray;
 use crate::media::{Medium, Passage};
 use crate::shade::{Around, Later, Optics, Pixel, Work};
 
@@ -26,7 +25,6 @@ pub(crate) struct Paths<'a> {
     pub media: &'a [Passage<'a>],
     /// Those of the first of them.
     pub surfaces: &'a Surfaces,
-    pub blocks: Option<&'a Blocks>,
     pub ior: f32,
     pub optics: &'a Optics,
     pub around: &'a Around<'a>,
@@ -44,7 +42,6 @@ impl<'a> Paths<'a> {
         Self {
             media,
             surfaces,
-            blocks: media[0].blocks.as_ref(),
             ior,
             optics,
             around,
@@ -103,25 +100,20 @@ impl<'a> Paths<'a> {
         }
     }
 
-    fn march(&mut self, ray: &Ray) -> Option<Hit> {
-        let (hit, columns) = match self.blocks {
-            Some(blocks) => march_blocks((self.surfaces, blocks), ray),
-            None => march(self.surfaces, ray),
-        };
-        self.work = self.work + Work { rays: 1, columns: columns.into() };
-        hit
-    }
-
     /// The light along a path that is a `part` of a pixel's: of a faint one, that of the surroundings.
     fn follow_part(&mut self, ray: Ray, (absorption, part): (Vec3, f32), pixel: &Pixel) {
         if part < FAINT && !ray.inside {
-            let Ray { origin, direction, .. } = ray;
-            let reach = f32::INFINITY;
-            let sight = Sight { origin, direction, reach, width: 0.0, spread: PART };
-            self.look(pixel, sight, Vec3::splat(part));
+            self.glance(pixel, (ray.origin, ray.direction), part);
         } else {
             self.follow(ray, (absorption, part), pixel);
         }
+    }
+
+    /// The surroundings along a faint path, which is a `part` of a pixel's.
+    pub fn glance(&mut self, pixel: &Pixel, (origin, direction): (Vec3, Vec3), part: f32) {
+        let reach = f32::INFINITY;
+        let sight = Sight { origin, direction, reach, width: 0.0, spread: PART };
+        self.look(pixel, sight, Vec3::splat(part));
     }
 
     /// The light along a path, which is a `part` of a pixel's.
@@ -130,7 +122,7 @@ impl<'a> Paths<'a> {
         // Neighbouring paths part at every boundary.
         let (mut width, mut spread) = (0.0, PART);
         for boundary in 0..=self.optics.depth {
-            let hit = self.march(&ray);
+            let hit = self.march(0, &ray);
             let reach = hit.map_or(f32::INFINITY, |h| h.distance);
             let Ray { origin, direction, .. } = ray;
             let sight = Sight { origin, direction, reach, width, spread };

@@ -40,14 +40,12 @@ impl Shadow {
     /// Length of liquid between the light and a point: the mean of the four columns about it.
     fn before(&self, point: Vec3) -> f32 {
         let rays = &self.view.rays;
-        let v = point - rays.origin;
-        let z = v.dot(rays.forward);
-        let (scale, slant) = match rays.projection {
-            Projection::Perspective => (1.0 / (rays.pixel * z), v.length() / z),
-            Projection::Orthographic => (1.0 / rays.pixel, 1.0),
+        let ([x, y], z) = self.view.place(point);
+        let [x, y] = [x - 0.5, y - 0.5];
+        let slant = match rays.projection {
+            Projection::Perspective => (point - rays.origin).length() / z,
+            Projection::Orthographic => 1.0,
         };
-        let x = rays.center[0] + v.dot(rays.right) * scale - 0.5;
-        let y = rays.center[1] - v.dot(rays.up) * scale - 0.5;
         if z <= self.view.near || !x.is_finite() || !y.is_finite() {
             return 0.0;
         }

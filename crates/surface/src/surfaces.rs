@@ -146,6 +146,21 @@ impl View {
         }
     }
 
+    /// The place of the picture and the depth of a point; of use where the depth is above 0.
+    #[inline]
+    pub fn place(&self, point: Vec3) -> ([f32; 2], f32) {
+        let rays = &self.rays;
+        let v = point - rays.origin;
+        let z = v.dot(rays.forward);
+        let scale = match rays.projection {
+            Projection::Perspective => 1.0 / (rays.pixel * z),
+            Projection::Orthographic => 1.0 / rays.pixel,
+        };
+        let x = rays.center[0] + v.dot(rays.right) * scale;
+        let y = rays.center[1] - v.dot(rays.up) * scale;
+        ([x, y], z)
+    }
+
     /// The point at a place of the picture and a nearness.
     #[inline]
     pub fn point(&self, [x, y]: [f32; 2], nearness: f32) -> Vec3 {

@@ -46,6 +46,20 @@ fn lights() -> Lights {
     Scene::default().resolve(None).map(|r| r.lights).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// That sky around liquid of a `color`, which nothing shades.
+fn around(lights: &Lights, color: Vec3) -> Around<'_> {
+    Around {
+        level: Level::new(),
+        lights,
+        beyond: &Hues,
+        shown: true,
+        shadow: None,
+        occlusion: None,
+        paint: None,
+        color,
+    }
+}
+
 /// What an eye sees of a clear ball: reflected, and refracted twice, each with the part that goes there.
 fn lens(origin: Vec3, direction: Vec3, radius: f32) -> Option<Vec3> {
     let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
@@ -77,16 +91,7 @@ fn a_ball_is_a_lens() {
             skip: true,
         };
         let lights = lights();
-        let around = Around {
-            level: Level::new(),
-            lights: &lights,
-            beyond: &Hues,
-            shown: true,
-            shadow: None,
-            occlusion: None,
-            paint: None,
-            color: Vec3::ONE,
-        };
+        let around = around(&lights, Vec3::ONE);
         let picture = shade(&[Medium { surfaces: &surfaces, ior: WATER }], &optics, &around);
         let mut error = 0.0;
         for (i, found) in picture.iter().enumerate() {
@@ -177,16 +182,7 @@ fn translucent_pixels_are_what_one_works_out_for_each() {
             skip: true,
         };
         let color = Vec3::new(0.2, 0.4, 0.9);
-        let around = Around {
-            level: Level::new(),
-            lights: &lights,
-            beyond: &Hues,
-            shown: true,
-            shadow: None,
-            occlusion: None,
-            paint: None,
-            color,
-        };
+        let around = around(&lights, color);
         let picture = shade(&[Medium { surfaces: &surfaces, ior: WATER }], &optics, &around);
         let mut most = 0;
         for (i, found) in picture.iter().enumerate() {
@@ -268,16 +264,7 @@ fn a_ball_in_a_ball_of_another_liquid_is_a_lens_in_a_lens() {
             skip: true,
         };
         let lights = lights();
-        let around = Around {
-            level: Level::new(),
-            lights: &lights,
-            beyond: &Hues,
-            shown: true,
-            shadow: None,
-            occlusion: None,
-            paint: None,
-            color: Vec3::ONE,
-        };
+        let around = around(&lights, Vec3::ONE);
         let picture = shade(&media, &optics, &around);
         let (mut error, mut count, mut bent) = (0.0_f64, 0, 0);
         for (i, found) in picture.iter().enumerate() {
@@ -303,16 +290,7 @@ fn a_ball_in_a_ball_of_another_liquid_is_a_lens_in_a_lens() {
 #[test]
 fn media_that_are_alike_are_one_liquid() {
     let lights = lights();
-    let around = Around {
-        level: Level::new(),
-        lights: &lights,
-        beyond: &Hues,
-        shown: true,
-        shadow: None,
-        occlusion: None,
-        paint: None,
-        color: Vec3::new(0.2, 0.4, 0.9),
-    };
+    let around = around(&lights, Vec3::new(0.2, 0.4, 0.9));
     let view = view((203, 149), Projection::Perspective);
     let all = drops(30);
     let of = |drops: &[Sphere]| {
