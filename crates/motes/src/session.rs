@@ -570,10 +570,9 @@ pub(crate) fn instruction_set(level: Level) -> &'static str {
         Level::Avx512(_) => "AVX-512",
         #[cfg(target_arch = "x86_64")]
         Level::Avx2(_) => "AVX2",
+        // Nothing is compiled for SSE4.2 alone.
         #[cfg(target_arch = "x86_64")]
-        Level::Sse4_2(_) => "SSE4.2",
-        #[cfg(target_arch = "x86_64")]
-        Level::Sse2(_) => "SSE2",
+        Level::Sse4_2(_) | Level::Sse2(_) => "SSE2",
         #[cfg(target_arch = "aarch64")]
         Level::Neon(_) => "NEON",
         _ => "scalar",
