@@ -19,6 +19,7 @@ mod environment;
 mod error;
 mod info;
 mod liquid;
+mod memo;
 mod opacity;
 mod open;
 mod paint;

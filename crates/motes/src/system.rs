@@ -37,6 +37,11 @@ impl Loaded {
         }
     }
 
+    /// What is visible, grid by grid.
+    pub fn visible(&self) -> &[Visibility] {
+        &self.visible
+    }
+
     /// How many particles pass the filters.
     pub fn count_visible(&self) -> usize {
         self.visible.iter().map(Visibility::visible).sum()
@@ -46,7 +51,7 @@ impl Loaded {
     ///
     /// # Errors
     /// There are no types.
-    pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
+    pub fn visible_by_type(&self) -> Result<Vec<(usize, Arc<Vec<Visibility>>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
         let grids = self.classes.grids.iter().zip(&*self.visible);
@@ -63,7 +68,7 @@ impl Loaded {
         let of_type = |kind: usize| {
             let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
             let all = grids.clone().map(|(grid, _)| Visibility::where_all(grid, &[], Some(&keep)));
-            (kind, all.collect::<Vec<_>>())
+            (kind, Arc::new(all.collect::<Vec<_>>()))
         };
         let all = (0..types.len()).map(of_type);
         Ok(all.filter(|(_, v)| v.iter().any(|v| v.visible() > 0)).collect())
