@@ -14,6 +14,7 @@
 mod annotate;
 pub mod bench;
 mod density;
+mod drawing;
 mod environment;
 mod error;
 mod info;
@@ -26,8 +27,10 @@ mod radius;
 mod scenery;
 mod session;
 mod simulate;
+mod stages;
 mod stats;
 mod system;
+mod view;
 
 pub use error::{Error, Result};
 pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
@@ -40,3 +43,4 @@ pub use picture::Picture;
 pub use session::{Layers, Quiet, Session, Shot, Watch};
 pub use simulate::{Simulated, scenarios};
 pub use stats::{Stats, peak_memory_bytes};
+pub use view::{Gallery, set_threads};

@@ -1,76 +1,33 @@
 //! One particle system of one frame: its grids, what is visible of them, and its colours.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
+use motes_grid::{BlockRanges, Filter, Grid, RadiusClasses, Seen, Visibility};
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
 use motes_scene::{Bounds, ColorBy, Scene, System};
 use motes_spheres::Spheres;
 
-use crate::annotate::box_shown;
 use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::Rule;
 use crate::{Error, Result, radius};
 
-/// A system ready to be drawn.
+/// A system ready to be drawn; [`crate::stages::Stages`] makes it.
+#[derive(Clone)]
 pub(crate) struct Loaded {
     /// Its place in the scene.
     pub number: u16,
     pub particles: Arc<Particles>,
     /// The simulation box, where it is shown.
     pub sim_box: Option<SimulationBox>,
-    pub classes: RadiusClasses,
-    pub visible: Vec<Visibility>,
-    pub paint: Paint,
+    pub classes: Arc<RadiusClasses>,
+    pub visible: Arc<Vec<Visibility>>,
+    pub paint: Arc<Paint>,
 }
 
 impl Loaded {
-    /// Builds the grids of `particles` about the scene's `origin`, and what is visible of them. Of
-    /// particles that nobody else holds the positions are let go once the grids hold them. They are built in the
-    /// memory of `spare`, such as those of the last frame.
-    ///
-    /// # Errors
-    /// A filter or colour names a property that is not there; an expression makes no sense.
-    pub fn new(
-        (mut particles, spare): (Arc<Particles>, RadiusClasses),
-        (scene, system): (&Scene, &System),
-        (number, origin): (u16, DVec3),
-        range: Option<[f64; 2]>,
-    ) -> Result<Self> {
-        let rule = radius::rule(&particles, system);
-        let params = Params {
-            resolution: Resolution::CellsPerParticle(scene.spheres.lambda as f32),
-            block_cells: scene.spheres.block,
-        };
-        let scale = system.radius_scale as f32;
-        let shift = DVec3::from_array(particles.origin) - origin;
-        let keeps = asks_for_positions(&particles, system);
-        let own = Arc::get_mut(&mut particles).filter(|_| !keeps);
-        let mut positions = match own.map(Particles::take_positions) {
-            Some(positions) => Cow::Owned(positions),
-            None => Cow::Borrowed(&particles.positions[..]),
-        };
-        if shift != DVec3::ZERO {
-            let about = |p: &mut [f32; 3]| {
-                *p = (Vec3::from_array(*p).as_dvec3() + shift).as_vec3().to_array();
-            };
-            positions.to_mut().iter_mut().for_each(about);
-        }
-        let mut classes = radius::classes(spare, positions, rule, scale, params);
-        let paint = Paint::new(&particles, system, range)?;
-        if !paint.opacity.is_opaque() {
-            // What is translucent hides nothing that coincides with it.
-            classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
-        }
-        let visible = visibility(&particles, &classes, system)?;
-        let sim_box = box_shown(&particles, scene.overlay.r#box);
-        Ok(Self { number, particles, sim_box, classes, visible, paint })
-    }
-
     /// Where radii were measured in this frame, makes them the scene's for all frames.
     pub fn hold_radius(&self, scene: &mut Scene) {
         let Some(system) = scene.system.get_mut(self.number as usize) else { return };
@@ -92,7 +49,7 @@ impl Loaded {
     pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
-        let grids = self.classes.grids.iter().zip(&self.visible);
+        let grids = self.classes.grids.iter().zip(&*self.visible);
         for (grid, visible) in grids.clone() {
             for block in 0..grid.blocks.len() - 1 {
                 let of = visible.block(grid, block);
@@ -120,7 +77,7 @@ impl Loaded {
     /// Boxes around what is visible, with radii, in world coordinates.
     pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
         let mut boxes = Vec::new();
-        for (grid, visible) in self.classes.grids.iter().zip(&self.visible) {
+        for (grid, visible) in self.classes.grids.iter().zip(&*self.visible) {
             let blocks = 0..grid.blocks.len() - 1;
             let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
             boxes.extend(
@@ -176,7 +133,7 @@ pub(crate) fn visibility(
 }
 
 /// Whether colours or what is visible go by the particles' positions.
-fn asks_for_positions(particles: &Particles, system: &System) -> bool {
+pub(crate) fn asks_for_positions(particles: &Particles, system: &System) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {

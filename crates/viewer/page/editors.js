@@ -120,7 +120,7 @@ function several(task, names) {
     id: i ? `${task.id}-${name}` : task.id,
     name: `${task.name}, ${name}`,
     shape: { kind: 'value', type: 'number' },
-    empty: task.empty?.replace(/[[\]]/g, '').split(',')[i]?.trim() ?? '',
+    empty: task.empty?.replace(/[[\]]/g, '').split(',').at(task.empty.includes(',') ? i : 0)?.trim() ?? '',
     send: (value, mark) => {
       all = all.map((v, k) => (k === i ? value : v));
       if (all.every((v) => v === null)) task.send(null, mark);

@@ -38,10 +38,12 @@ class FieldPart extends Part {
     });
     this.reset = h('button', { class: 'plain icon reset', title: 'Back to the default', 'aria-label': `${name}: back to the default`, onclick: () => this.#send(null, true) }, icon('reset'));
     this.error = h('p', { class: 'error', role: 'alert', hidden: true });
-    const title = h('label', { for: id, title: field.meaning }, name, field.unit && h('span', { class: 'unit' }, field.unit));
+    const title = h('label', { for: id, title: field.meaning }, name, h('span', { class: 'unit' }, unit(field)));
     if (this.editor.nudge) this.#drag(title);
-    this.classList.toggle('long', ['vec3'].includes(shape.type ?? '') || shape.kind !== 'value');
-    this.replaceChildren(title, this.editor.element, this.reset,
+    // What is wide has a line of its own.
+    const letters = (shape.type === 'choice' && !this.editor.element.matches('select') && this.editor.element.textContent.length) || 0;
+    this.classList.toggle('long', shape.type === 'vec3' || shape.kind !== 'value' || letters > 16);
+    this.replaceChildren(title, this.reset, this.editor.element,
       this.options.explain ? h('p', { class: 'meaning' }, field.meaning) : '', this.error);
     this.listen(store, 'scene', () => this.#show());
     this.#show();
@@ -101,6 +103,13 @@ export function field(path, options = {}) {
   const part = h('motes-field', { path });
   part.options = options;
   return part;
+}
+
+/** The unit of a parameter in a sign; lengths of the world have none. @param {import('./types.js').Field} field */
+function unit({ unit: words = '' }) {
+  if (/degree/.test(words)) return '°';
+  if (/pixel/.test(words)) return 'px';
+  return /world|unit|radi/.test(words) ? '' : words;
 }
 
 /** A heading with what belongs to it, which folds. @param {string} title @param {boolean} open @param {...any} children */

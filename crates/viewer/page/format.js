@@ -51,7 +51,7 @@ export function parse(text) {
  * @returns {string}
  */
 export function label(name) {
-  const words = name.replaceAll('_', ' ');
+  const words = name.replaceAll('_', ' ').replace('color', 'colour');
   const known = /** @type {Record<string, string>} */ ({ fov: 'Field of view', ior: 'Index of refraction', by: 'Colour by', map: 'Colour map', sph: 'SPH simulation', iors: 'Indices of refraction' });
   return known[name] ?? words.charAt(0).toUpperCase() + words.slice(1);
 }

@@ -12,7 +12,8 @@ use serde::Serialize;
 
 use super::shot::{Shot, Studio};
 use super::{chosen, median, pool, timed};
-use crate::session::{instruction_set, wanted};
+use crate::drawing::instruction_set;
+use crate::session::wanted;
 use crate::system::{Loaded, visibility};
 use crate::{Error, Result, Watch, peak_memory_bytes, radius};
 
@@ -183,7 +184,8 @@ impl Bench {
                 "build" => {
                     let mut times = Vec::new();
                     for _ in 0..self.frames {
-                        let built = self.build(loaded.classes)?;
+                        let spare = Arc::try_unwrap(loaded.classes).unwrap_or_default();
+                        let built = self.build(spare)?;
                         times.push(built.0);
                         loaded = built.1;
                     }
@@ -218,7 +220,8 @@ impl Bench {
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;
-        let paint = crate::paint::Paint::new(particles, system, None)?;
+        let (classes, visible) = (Arc::new(classes), Arc::new(visible));
+        let paint = Arc::new(crate::paint::Paint::new(particles, system, None)?);
         let particles = Arc::clone(particles);
         Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
     }
