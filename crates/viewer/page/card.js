@@ -44,7 +44,7 @@ class Card extends Part {
       ['Particle Identifier', picked.id === undefined || picked.id === null ? undefined : String(picked.id)],
       ['Element', picked.element],
       ['Type', picked.type === undefined || picked.type === null ? undefined : String(picked.type)],
-      ['Position', picked.position.map((p) => number(p, 7)).join('  ')],
+      ['Position', picked.position.map((p) => number(p, 6)).join('  ')],
       ['Radius', number(picked.radius)],
     ]).filter(([, value]) => value !== undefined);
     const said = new Set(['Position', 'Radius', 'Particle Identifier', 'Particle Type', 'Element']);

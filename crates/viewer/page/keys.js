@@ -98,7 +98,10 @@ addEventListener('keydown', (e) => {
     store.tell('save');
     return;
   }
-  if (writes(e.target) && key !== 'Escape') return;
+  if (writes(e.target) || document.querySelector('dialog[open], :popover-open')) {
+    if (key === 'Escape') /** @type {HTMLElement} */ (e.target).blur();
+    return;
+  }
   if (command && (key === 'z' || key === 'y')) {
     e.preventDefault();
     store.ask(key === 'y' || e.shiftKey ? 'redo' : 'undo');

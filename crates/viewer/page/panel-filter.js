@@ -123,6 +123,7 @@ class FilterPanel extends Panel {
     }
     // What was typed stays, with what is wrong with it under it.
     this.wrong = true;
+    if (!(await this.#check())) return;
     try {
       await store.set({ [store.mine('where')]: where });
       this.wrong = false;

@@ -67,7 +67,9 @@ class Stage extends Part {
     store.line.say('shown', { serial: frame.serial });
     // Decoding may overtake: an older picture is never drawn over a newer one.
     if (this.frame && frame.serial < this.frame.serial && frame.serial > 1) return picture.close();
-    const [width, height] = (this.size ?? `${frame.width}×${frame.height}`).split('×').map(Number);
+    // A picture of another shape, made before the window changed, keeps its own.
+    let [width, height] = (this.size ?? '').split('×').map(Number);
+    if (!(Math.abs((width * frame.height) / (height * frame.width) - 1) < 0.03)) [width, height] = [frame.width, frame.height];
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;

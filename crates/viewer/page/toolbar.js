@@ -23,7 +23,7 @@ class Toolbar extends Part {
     this.setAttribute('aria-label', 'Tools');
     this.source = h('span', { class: 'source' });
     this.state = h('button', { class: 'plain state', hidden: true, onclick: () => store.line?.retry() });
-    this.tools = TOOLS.map(([tool, glyph, title]) => this.#button(glyph, title, () => store.use(tool), { 'data-tool': tool, 'aria-pressed': 'false' }));
+    this.tools = TOOLS.map(([tool, glyph, title]) => this.#button(glyph, title, () => store.use(store.tool === tool ? 'move' : tool), { 'data-tool': tool, 'aria-pressed': 'false' }));
     this.projection = this.#button('perspective', 'Perspective or orthographic (P, O)', () => project(store.get('camera.projection') === 'perspective' ? 'orthographic' : 'perspective'));
     this.undo = this.#button('undo', 'Undo (Ctrl Z)', () => store.ask('undo'));
     this.redo = this.#button('redo', 'Redo (Ctrl Shift Z)', () => store.ask('redo'));
