@@ -26,6 +26,11 @@ const PANELS = [
 ];
 
 class Dock extends Part {
+  /** @type {any[]} */
+  tabs = [];
+  /** Name of the panel that is open. */
+  open = '';
+
   start() {
     const wide = matchMedia('(min-width: 760px)').matches;
     this.open = localStorage.getItem('motes-panel') ?? (wide ? 'look' : '');

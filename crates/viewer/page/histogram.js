@@ -16,6 +16,10 @@ class Histogram extends Part {
   range = null;
   /** @type {((part: number) => string)|null} colour of a place between the handles, 0…1 */
   colors = null;
+  /** @type {any[]} the two handles, the two fields */
+  handles = [];
+  /** @type {any[]} */
+  inputs = [];
 
   start() {
     if (this.plot) return;

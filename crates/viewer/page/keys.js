@@ -104,7 +104,8 @@ addEventListener('keydown', (e) => {
   }
   if (command && (key === 'z' || key === 'y')) {
     e.preventDefault();
-    store.ask(key === 'y' || e.shiftKey ? 'redo' : 'undo');
+    const what = key === 'y' || e.shiftKey ? 'redo' : 'undo';
+    if (store[what] > 0) store.ask(what);
     return;
   }
   if (command || e.altKey || !store.line?.open) return;

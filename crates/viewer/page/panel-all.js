@@ -9,6 +9,11 @@ import { store } from './store.js';
 /** @typedef {import('./types.js').Field} Field */
 
 class All extends Panel {
+  /** Paths of folds that are open. @type {Set<string>} */
+  opened = new Set();
+  /** What is searched for. */
+  words = '';
+
   plan() {
     // Lists grow and shrink; what is in them shows by itself.
     return JSON.stringify(this.#lengths(store.schema, ''));
@@ -28,7 +33,7 @@ class All extends Panel {
   build() {
     const box = h('input', {
       type: 'search', id: 'search', placeholder: 'Search names and meanings', 'aria-label': 'Search parameters', spellcheck: 'false',
-      value: this.words ?? '',
+      value: this.words,
       oninput: quiet(120, () => { this.words = box.value; this.#fill(); }),
     });
     this.tree = h('div', { class: 'tree' });
@@ -37,7 +42,7 @@ class All extends Panel {
   }
 
   #fill() {
-    const words = (this.words ?? '').toLowerCase().split(/\s+/).filter(Boolean);
+    const words = this.words.toLowerCase().split(/\s+/).filter(Boolean);
     if (!words.length) {
       this.tree.replaceChildren(...this.#table(store.schema, '', true));
       return;
@@ -74,7 +79,6 @@ class All extends Panel {
 
   /** A fold that is filled when it is opened. @param {string} title @param {string} meaning @param {() => any[]} fill @param {string} path */
   #branch(title, meaning, fill, path) {
-    this.opened ??= new Set();
     const inside = h('div', { class: 'folded' });
     const part = h('details', { class: 'fold', open: this.opened.has(path), ontoggle: () => {
       if (part.open) this.opened.add(path);

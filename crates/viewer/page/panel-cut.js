@@ -13,6 +13,9 @@ const WORDS = { caps: 'Flat', open: 'Open', centre: 'Whole' };
 const OWN = ['on', 'point', 'normal', 'cut', 'name'];
 
 class Cut extends Panel {
+  /** @type {{on: any, name: any, range: any}[]} */
+  rows = [];
+
   plan() {
     return JSON.stringify([sections().length, store.section]);
   }
@@ -68,12 +71,12 @@ class Cut extends Panel {
         fold('More', false, field(`${base}.point`), field(`${base}.normal`),
           (store.field('section')?.shape.of?.fields ?? []).filter((f) => !OWN.includes(f.name)).map((f) => field(`${base}.${f.name}`))),
       ]);
-    this.rows?.push({ on, name, range });
+    this.rows.push({ on, name, range });
     return row;
   }
 
   update() {
-    this.rows?.forEach(({ on, name, range }, i) => {
+    this.rows.forEach(({ on, name, range }, i) => {
       const section = sections()[i];
       if (!section) return;
       const { least, most, at } = travel(section);

@@ -9,9 +9,14 @@ import { store } from './store.js';
 /** @typedef {{property: string, component?: string, min?: number|null, max?: number|null}} Filter */
 
 class FilterPanel extends Panel {
+  /** Asks how many it would be, once typing has stopped. */
+  check = quiet(250, () => this.#check());
+  /** Whether the box holds what could not be applied. */
+  wrong = false;
+
   plan() {
     const filters = this.filters();
-    return JSON.stringify([store.system, filters.map((f) => [f.property, f.component])]);
+    return JSON.stringify(filters.map((f) => [f.property, f.component]));
   }
 
   /** @returns {Filter[]} */
@@ -34,7 +39,6 @@ class FilterPanel extends Panel {
       },
     });
     this.says.id = 'where-says';
-    this.check = quiet(250, () => this.#check());
     const names = [...(system()?.properties.map((p) => p.name) ?? []), 'Index'];
     const first = names.find((n) => n !== 'Position') ?? 'Position';
     return [

@@ -11,6 +11,9 @@ import { reach } from './paths.js';
 const WAYS = [['auto', 'Automatic'], ['uniform', 'One colour'], ['element', 'Element'], ['type', 'Type'], ['chain', 'Chain'], ['residue', 'Residue']];
 
 class Look extends Panel {
+  /** What the histogram is of. */
+  key = '';
+
   plan() {
     const by = store.get(store.mine('color.by'));
     return JSON.stringify([by, store.get('renderer'), store.get('surface.mode')]);

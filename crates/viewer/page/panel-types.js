@@ -1,18 +1,18 @@
 /** @file The panel Types: each type of particles with its switch, its colour and its radius. */
 import { h } from './dom.js';
 import { field } from './field.js';
-import { count, number, parse } from './format.js';
+import { count, parse } from './format.js';
 import { Panel, property, system, systemChoice } from './panel.js';
 import { hidden, withHidden } from './where.js';
 import { store } from './store.js';
 
 class Types extends Panel {
-  plan() {
-    return JSON.stringify(system()?.types ?? []);
-  }
+  /** @type {{name: string, element: any, on: any, color: any, radius: any, number: any}[]} */
+  rows = [];
 
   build() {
     const types = system()?.types ?? [];
+    this.rows = [];
     if (!types.length) {
       return [systemChoice(), h('p', { class: 'empty' }, 'These particles have no types. Colour them by a property in Look, show some of them by a Filter.')];
     }
@@ -42,20 +42,23 @@ class Types extends Panel {
       onchange: () => this.#entry('radii', type.name, parse(radius.value) ?? null, true),
     });
     const only = h('button', { class: 'plain small', title: `Show ${type.name} only`, onclick: () => this.#hide((system()?.types ?? []).map((t) => t.name).filter((n) => n !== type.name)) }, 'only');
-    const element = h('li', {}, on, color, h('span', { class: 'type', title: type.name }, type.name), h('span', { class: 'count' }, count(type.count)), only, radius);
-    return { type, element, on, color, radius };
+    const number = h('span', { class: 'count' });
+    const element = h('li', {}, on, color, h('span', { class: 'type', title: type.name }, type.name), number, only, radius);
+    return { name: type.name, element, on, color, radius, number };
   }
 
   update() {
     const gone = this.#hidden();
     const colors = store.get(store.mine('color.colors')) ?? {};
     const radii = store.get(store.mine('radii')) ?? {};
-    for (const { type, on, color, radius, element } of this.rows ?? []) {
-      on.checked = !gone.includes(type.name);
+    for (const { name, on, color, radius, element, number } of this.rows) {
+      const type = system()?.types.find((t) => t.name === name);
+      on.checked = !gone.includes(name);
       element.classList.toggle('off', !on.checked);
-      const shown = colors[type.name] ?? type.color;
+      number.textContent = count(type?.count ?? 0);
+      const shown = String(colors[name] ?? type?.color);
       if (/^#[0-9a-f]{6}/i.test(shown)) color.value = shown.slice(0, 7);
-      if (document.activeElement !== radius) radius.value = radii[type.name] === undefined ? '' : number(radii[type.name]);
+      if (document.activeElement !== radius) radius.value = radii[name] === undefined ? '' : String(radii[name]);
     }
   }
 

@@ -4,19 +4,22 @@ import { store } from './store.js';
 
 export class Panel extends Part {
   start() {
-    /** What the contents depend on, see `plan`. */
-    this.planned = this.plan();
-    this.listen(store, 'systems system', () => this.#build());
-    this.listen(store, 'scene', () => {
-      const plan = this.plan();
-      if (plan !== this.planned) this.#build();
-      else this.update();
+    this.listen(store, 'system', () => this.#build());
+    // Built anew in the middle of a drag, a panel would lose it: only when it has to be.
+    this.listen(store, 'systems scene', () => {
+      if (this.#planned() === this.built) this.update();
+      else this.#build();
     });
     this.#build();
   }
 
+  #planned() {
+    const kinds = store.systems.map((s) => [s.name, s.properties.map((p) => [p.name, p.components]), s.types.map((t) => t.name)]);
+    return JSON.stringify([store.system, kinds, this.plan()]);
+  }
+
   #build() {
-    this.planned = this.plan();
+    this.built = this.#planned();
     const held = document.activeElement?.id;
     this.replaceChildren(...this.build().flat(9).filter(Boolean));
     this.update();

@@ -10,18 +10,23 @@ import './card.js';
 const MOST_PIXELS = 3840 * 2160;
 
 class Stage extends Part {
+  /** The size that was asked for, `1280×720`. */
+  size = '';
+  /** Times of the last pictures. @type {number[]} */
+  times = [];
+  resized = quiet(60, () => this.#resize());
+
   start() {
     this.canvas = h('canvas', {
       tabindex: 0, role: 'img', 'aria-label': 'The picture. Arrow keys turn it; press ? for all keys.',
     });
-    this.context = /** @type {HTMLCanvasElement} */ (this.canvas).getContext('2d');
+    this.context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext('2d'));
     this.readout = h('div', { class: 'readout' });
     this.hint = h('div', { class: 'hint', role: 'status', hidden: true });
     this.wait = h('div', { class: 'wait' }, h('span', { class: 'ring' }), h('span', {}, 'Opening…'));
     this.replaceChildren(this.canvas, h('motes-overlay'), this.hint, this.readout, h('motes-card'), this.wait);
     gestures(this.canvas);
 
-    this.resized = quiet(60, () => this.#resize());
     new ResizeObserver(() => this.resized()).observe(this);
     this.listen(store, 'frame', (e) => this.#show(e.detail));
     this.listen(store, 'hello', () => this.#hello());
@@ -68,15 +73,15 @@ class Stage extends Part {
     // Decoding may overtake: an older picture is never drawn over a newer one.
     if (this.frame && frame.serial < this.frame.serial && frame.serial > 1) return picture.close();
     // A picture of another shape, made before the window changed, keeps its own.
-    let [width, height] = (this.size ?? '').split('×').map(Number);
+    let [width, height] = this.size.split('×').map(Number);
     if (!(Math.abs((width * frame.height) / (height * frame.width) - 1) < 0.03)) [width, height] = [frame.width, frame.height];
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    this.context.imageSmoothingEnabled = true;
-    this.context.imageSmoothingQuality = 'high';
-    this.context.drawImage(picture, 0, 0, width, height);
+    const context = /** @type {CanvasRenderingContext2D} */ (this.context);
+    context.imageSmoothingQuality = 'high';
+    context.drawImage(picture, 0, 0, width, height);
     picture.close();
     this.frame = frame;
     this.wait.hidden = true;
@@ -91,7 +96,7 @@ class Stage extends Part {
 
   #rate() {
     const now = performance.now();
-    this.times = [...(this.times ?? []), now].filter((t) => now - t < 1000);
+    this.times = [...this.times, now].filter((t) => now - t < 1000);
   }
 
   /** What the picture is: particles, size, time. */
@@ -100,7 +105,7 @@ class Stage extends Part {
     if (!frame) return;
     const particles = store.systems.reduce((n, s) => n + s.particles, 0);
     const visible = this.stats?.particles?.visible;
-    const moving = (this.times?.length ?? 0) > 2 && !frame.exact;
+    const moving = this.times.length > 2 && !frame.exact;
     this.readout.replaceChildren(
       h('span', {}, visible !== undefined && visible !== particles
         ? `${count(visible)} of ${count(particles)} particles` : `${count(particles)} particles`),

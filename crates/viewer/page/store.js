@@ -32,6 +32,8 @@ class Store extends EventTarget {
     /** @type {any} */
     this.limits = {};
     this.version = '';
+    /** Number of the last change that the server told of. */
+    this.state = 0;
     this.undo = 0;
     this.redo = 0;
     this.link = 'opening';
@@ -90,6 +92,7 @@ class Store extends EventTarget {
       this.#overlay();
       if (this.inFlight === 0 && !this.pending) this.moving = null;
       this.resolved = message.resolved;
+      this.state = message.state;
       this.undo = Number(message.undo ?? 0);
       this.redo = Number(message.redo ?? 0);
       this.tell(is);

@@ -33,7 +33,7 @@ class Timeline extends Part {
     this.drop = h('input', { type: 'checkbox', id: 'drop', onchange: () => this.playing && this.#send(true) });
     this.live = this.#live();
     this.film = h('div', { class: 'film' },
-      h('div', { class: 'group' }, button('first', 'First frame', () => this.#go(0, true)), button('back', 'Frame back (,)', () => this.#step(-1)), this.play, button('on', 'Frame on (.)', () => this.#step(1)), button('last', 'Last frame', () => this.#go(this.frames - 1, true))),
+      h('div', { class: 'group' }, this.#far(button('first', 'First frame', () => this.#go(0, true))), button('back', 'Frame back (,)', () => this.#step(-1)), this.play, button('on', 'Frame on (.)', () => this.#step(1)), this.#far(button('last', 'Last frame', () => this.#go(this.frames - 1, true)))),
       h('div', { class: 'track' }, this.ahead, this.slider),
       h('div', { class: 'where' }, this.box, this.of),
       h('div', { class: 'group options' }, this.loop, this.speed, h('label', { for: 'drop', title: 'Leave frames out rather than fall behind' }, this.drop, 'in time')));
@@ -44,6 +44,12 @@ class Timeline extends Part {
     this.listen(store, 'toggle-play', () => this.#toggle());
     this.listen(store, 'step', (e) => this.#step(e.detail));
     this.#update();
+  }
+
+  /** Not on a phone. @param {any} button */
+  #far(button) {
+    button.classList.add('far');
+    return button;
   }
 
   /** Pause, step, start again, and how fine, of a simulation. */

@@ -18,6 +18,9 @@ const TOOLS = [
 const SIDES = ['Front', 'Right', 'Top', 'Back', 'Left', 'Bottom'];
 
 class Toolbar extends Part {
+  /** @type {any[]} */
+  tools = [];
+
   start() {
     this.setAttribute('role', 'toolbar');
     this.setAttribute('aria-label', 'Tools');
