@@ -1,6 +1,6 @@
 /** @file Elements out of words: the few helpers that every part of the page is written with. */
 
-/** @typedef {Node|string|number|null|undefined|false|Child[]} Child */
+/** @typedef {Node|string|number|null|undefined|false|any[]} Child a list of them, too */
 
 /**
  * An element: `h('button', {class: 'x', onclick: f}, 'text')`. Names with `on` are listeners, `style` is an

@@ -37,15 +37,18 @@ class Overlay extends Part {
     if (!camera) return;
     const [w, h] = [this.clientWidth, this.clientHeight];
     this.svg.setAttribute('viewBox', `0 0 ${w} ${h}`);
-    /** @type {(p: Vec3) => {x: number, y: number, depth: number}} */
-    this.place = (p) => {
-      const { x, y, depth } = camera.project(p);
-      return { x: x * w, y: y * h, depth };
-    };
+    this.view = { camera, w, h };
     this.marks.replaceChildren(...this.#picked(camera, h), ...store.measures.map((m) => this.#measure(m)));
     // A plane that is dragged keeps its handles: they hold the pointer.
     if (!this.dragging) this.#plane();
     else this.#plane(true);
+  }
+
+  /** Where a point is, pixels, and its depth. @param {Vec3} p */
+  place(p) {
+    if (!this.view) return { x: 0, y: 0, depth: 0 };
+    const { x, y, depth } = this.view.camera.project(p);
+    return { x: x * this.view.w, y: y * this.view.h, depth };
   }
 
   /** @param {import('./camera.js').Camera} camera @param {number} height */
