@@ -62,12 +62,11 @@ export function begin() {
   }
   const before = JSON.parse(sessionStorage.getItem('motes') ?? 'null');
   const again = before && before.token === token && before.hash === location.hash;
-  let first = true;
+  let had = again ? before.view : null;
   store.addEventListener('hello', () => {
-    if (first && !again) open();
-    // A server that no longer knows the view gives another: what was seen is in the address.
-    else if (store.line.view !== before?.view && location.hash === last && last) open();
-    first = false;
+    // A new view, or one in place of a view that the server no longer knows: what was seen is in the address.
+    if (store.line.view !== had) open();
+    had = store.line.view;
     remember();
   });
   store.addEventListener('scene', write);

@@ -35,6 +35,7 @@ export function gestures(canvas) {
   canvas.addEventListener('pointercancel', (e) => touches.delete(e.pointerId));
   canvas.addEventListener('lostpointercapture', (e) => touches.delete(e.pointerId));
   canvas.addEventListener('pointermove', (e) => {
+    if (touches.has(e.pointerId)) touches.set(e.pointerId, e);
     if (e.pointerType === 'mouse' && e.buttons === 0) hover(canvas, e);
   });
   canvas.addEventListener('pointerleave', leave);
@@ -57,6 +58,7 @@ function press(canvas, down, touches) {
   let [last, moved] = [down, false];
   follow(down, (e) => {
     // A second finger takes over.
+    if (touches.size > 1) [last, moved] = [e, true];
     if (touches.size > 1) return;
     const far = Math.hypot(e.clientX - down.clientX, e.clientY - down.clientY) > SLIP;
     const camera = store.camera;
@@ -125,7 +127,6 @@ function pinch(canvas, touches) {
   canvas.addEventListener('pointermove', (e) => {
     const camera = store.camera;
     if (!ids.includes(e.pointerId) || !camera) return;
-    touches.set(e.pointerId, e);
     const now = state();
     const at = within(canvas, { clientX: now.x, clientY: now.y });
     const height = canvas.clientHeight;

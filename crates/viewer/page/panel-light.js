@@ -10,7 +10,11 @@ import { add, dot, scale, unit } from './vector.js';
 const SIZE = 132;
 
 class LightPanel extends Panel {
+  /** What the ball was drawn for. */
+  drawn = '';
+
   build() {
+    this.drawn = '';
     this.ball = h('canvas', {
       class: 'ball', width: SIZE * 2, height: SIZE * 2, tabindex: 0, role: 'slider', 'aria-label': 'Where the light comes from: arrow keys move it',
       'aria-valuenow': 0,
@@ -80,6 +84,9 @@ class LightPanel extends Panel {
   update() {
     if (!this.ball) return;
     const d = this.direction;
+    const drawn = JSON.stringify([d, store.get('light.intensity'), store.get('light.fill')]);
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     this.#draw(d);
     const height = Math.round((Math.asin(Math.max(-1, Math.min(1, d[1]))) * 180) / Math.PI);
     const side = Math.round((Math.atan2(d[0], d[2]) * 180) / Math.PI);
