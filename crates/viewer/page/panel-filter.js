@@ -11,8 +11,10 @@ import { store } from './store.js';
 class FilterPanel extends Panel {
   /** Asks how many it would be, once typing has stopped. */
   check = quiet(250, () => this.#check());
-  /** Whether the box holds what could not be applied. */
-  wrong = false;
+  /** What was typed and is not applied. @type {string|undefined} */
+  typed = undefined;
+  /** How often the server was asked: only its last answer counts. */
+  asked = 0;
 
   plan() {
     const filters = this.filters();
@@ -29,7 +31,7 @@ class FilterPanel extends Panel {
     this.box = h('textarea', {
       id: 'where', rows: 3, spellcheck: 'false', autocapitalize: 'off', autocomplete: 'off',
       placeholder: 'all particles', 'aria-describedby': 'where-says',
-      oninput: () => this.check(),
+      oninput: () => { this.typed = this.box.value; this.check(); },
       onchange: () => this.#apply(),
       onkeydown: (/** @type {KeyboardEvent} */ e) => {
         if (e.key === 'Enter' && !e.shiftKey) {
@@ -79,8 +81,8 @@ class FilterPanel extends Panel {
 
   update() {
     const where = store.get(store.mine('where')) ?? '';
-    if (document.activeElement !== this.box && !this.wrong) {
-      this.box.value = where;
+    if (this.box.value !== (this.typed ?? where)) {
+      this.box.value = this.typed ?? where;
       this.check();
     }
     for (const plot of /** @type {NodeListOf<any>} */ (this.querySelectorAll('motes-histogram'))) {
@@ -103,18 +105,21 @@ class FilterPanel extends Panel {
     const plain = /^[A-Za-z_][\w ]*$/.test(name) ? name : `\`${name}\``;
     this.box.setRangeText(plain, this.box.selectionStart, this.box.selectionEnd, 'end');
     this.box.focus();
+    this.typed = this.box.value;
     this.check();
   }
 
   /** Asks how many it would be, or what is wrong. */
   async #check() {
     const where = this.box.value.trim();
+    const mine = (this.asked += 1);
+    const say = (/** @type {string} */ text, /** @type {boolean} */ bad) => mine === this.asked && this.#say(text, bad);
     try {
       const { count: n } = await store.line.ask('check', { system: store.system, where });
-      this.#say(where === '' ? '' : `${count(n)} of ${count(system()?.particles ?? n)} particles`, false);
+      say(where === '' ? '' : `${count(n)} of ${count(system()?.particles ?? n)} particles`, false);
       return true;
     } catch (error) {
-      this.#say(/** @type {Error} */ (error).message, true);
+      say(/** @type {Error} */ (error).message, true);
       return false;
     }
   }
@@ -122,15 +127,14 @@ class FilterPanel extends Panel {
   async #apply() {
     const where = this.box.value.trim();
     if (where === (store.get(store.mine('where')) ?? '')) {
-      this.wrong = false;
+      this.typed = undefined;
       return this.#check();
     }
     // What was typed stays, with what is wrong with it under it.
-    this.wrong = true;
     if (!(await this.#check())) return;
     try {
       await store.set({ [store.mine('where')]: where });
-      this.wrong = false;
+      this.typed = undefined;
       this.#check();
     } catch (error) {
       this.#say(/** @type {Error} */ (error).message, true);
