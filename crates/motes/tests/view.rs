@@ -228,6 +228,9 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
         ("histogram", json!({"system": 3, "property": "Position"}), "system"),
         ("histogram", json!({"property": "Position", "bins": 1e9}), "bins"),
         ("check", json!({"system": 0, "where": "Position.x >"}), "column"),
+        ("set", json!({"changes": {"system.0.where": "Nothing > 1"}}), "Nothing"),
+        ("set", json!({"changes": {"system.0.color.by": "Vellocity"}}), "Vellocity"),
+        ("set", json!({"changes": {"system.0.filter": [{"property": "Nothing"}]}}), "Nothing"),
         ("nonsense", json!({}), "nonsense"),
     ];
     for (what, fields, part) in refused {
@@ -237,9 +240,9 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
     }
     assert!(client.settle().exact);
     // What only shows when it is drawn is told, and the next picture is as good as ever.
-    client.set(json!({"system.0.where": "Nothing > 1"})).unwrap();
+    client.set(json!({"renderer": "surface", "surface.environment": "/no/such.png"})).unwrap();
     while client.draw().1 != Next::Asked {}
-    assert!(client.last("notice")["text"].as_str().unwrap().contains("Nothing"));
+    assert!(client.last("notice")["text"].as_str().unwrap().contains("/no/such.png"));
     client.ask("undo", json!({})).unwrap();
     assert!(client.settle().exact);
 }

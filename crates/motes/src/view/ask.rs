@@ -101,10 +101,14 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
     let changes = fields.get("changes").and_then(Value::as_object);
     let changes = changes.ok_or_else(|| missing("`changes`, an object of paths and values"))?;
     let ends = fields.get("mark").and_then(Value::as_bool).unwrap_or(true);
+    let seen = lock(&guest.seen).clone();
     guest.change(|state| {
         let mut scene = state.scene().clone();
         for (path, value) in changes {
             put(&mut scene, path, value)?;
+        }
+        if let Some(seen) = &seen {
+            inquire::check_changes((&scene, state.scene()), seen)?;
         }
         state.change(scene, ends)
     })

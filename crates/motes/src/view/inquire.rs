@@ -12,7 +12,7 @@ use motes_spheres::{Counts, Packet, Spheres};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::paint::find_property;
+use crate::paint::{Paint, find_property};
 use crate::session::Seen;
 use crate::system::Loaded;
 use crate::{Error, Result};
@@ -264,6 +264,32 @@ pub(super) fn check(seen: &Seen, fields: &Map<String, Value>) -> Result<Value> {
     }
     let selected = select(text, particles).map_err(|e| Error::Usage(e.to_string()))?;
     Ok(json!({"count": selected.count()}))
+}
+
+/// Refuses a scene that asks for what the particles seen last do not have, where it differs from another.
+///
+/// # Errors
+/// As drawing it would.
+pub(super) fn check_changes((scene, before): (&Scene, &Scene), seen: &Seen) -> Result<()> {
+    for loaded in &seen.loaded {
+        let number = usize::from(loaded.number);
+        let (Some(system), Some(had)) = (scene.system.get(number), before.system.get(number)) else {
+            continue;
+        };
+        let particles = &loaded.particles;
+        if system.r#where != had.r#where && !system.r#where.trim().is_empty() {
+            select(&system.r#where, particles).map_err(|e| Error::Usage(e.to_string()))?;
+        }
+        if system.filter != had.filter {
+            for filter in &system.filter {
+                find_property(particles, &filter.property, filter.component)?;
+            }
+        }
+        if (&system.color.by, &system.color.map) != (&had.color.by, &had.color.map) {
+            Paint::new(particles, system, None)?;
+        }
+    }
+    Ok(())
 }
 
 /// The system that a request names.
