@@ -16,7 +16,7 @@ const MOTES = process.env.MOTES ?? 'motes';
 const ROOT = path.resolve(import.meta.dirname, '../../../..');
 
 /** Milliseconds that something may take on a slow machine. */
-export const PATIENCE = 30_000;
+export const PATIENCE = Number(process.env.MOTES_PATIENCE_MS ?? 30_000);
 
 /** A file of the repository's `data/`. */
 export const data = (name) => path.join(ROOT, 'data', name);
@@ -98,6 +98,9 @@ function words(page) {
   /** Waits for the exact picture of the newest state; gives its hash. */
   async function exact() {
     const rested = async () => {
+      // A picture from before the window had its size does not count.
+      const sized = await canvas.evaluate((c) => Math.abs(c.width - c.clientWidth * devicePixelRatio) < 1);
+      if (!sized) return '';
       const [exactly, hash] = [await canvas.getAttribute('data-exact'), await canvas.getAttribute('data-hash')];
       const [state, idle] = [Number(await canvas.getAttribute('data-state')), await store('!store.pending && store.inFlight === 0 && store.state')];
       return exactly === 'true' && idle !== false && state === idle ? hash : '';

@@ -134,14 +134,14 @@ page('the handles of the histogram hold the range of the colours and of what is 
 });
 
 page('frames play, stop, and are stepped', PEPTIDE, {}, async (seen) => {
-  assert.equal(await seen.store('store.resolved.frames'), 38);
+  assert.equal(await seen.store('store.resolved.frames'), 5);
   await seen.canvas.focus();
   await seen.page.keyboard.press('.');
   await until(async () => await seen.store('store.get("image.frame")') === 1, 'the next frame');
   await seen.exact();
   await seen.page.keyboard.press(' ');
   const slider = seen.page.getByRole('slider', { name: 'Frame' });
-  await until(async () => Number(await slider.inputValue()) > 5, 'frames to pass');
+  await until(async () => Number(await slider.inputValue()) > 2, 'frames to pass');
   await seen.page.keyboard.press(' ');
   await until(async () => !(await seen.store('store.playing ?? store.resolved.playing')), 'an end');
   await seen.exact();
@@ -288,6 +288,8 @@ page('what is there has names and can be reached by keys', PEPTIDE, { dark: true
 page('text has contrast, dark and light', PEPTIDE, {}, async (seen) => {
   for (const dark of [false, true]) {
     await seen.page.evaluate(`document.documentElement.style.colorScheme = '${dark ? 'dark' : 'light'}'`);
+    // Colours change over a moment.
+    await new Promise((resolve) => { setTimeout(resolve, 400); });
     const poor = await seen.page.evaluate(() => {
       const canvas = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
       const rgb = (color) => {
