@@ -115,7 +115,7 @@ function words(page) {
     /** The middle of the picture and its size, in the window. */
     async middle() {
       const box = await canvas.boundingBox();
-      return { x: box.x + box.width / 2, y: box.y + box.height / 2, ...box, left: box.x, top: box.y };
+      return { ...box, x: box.x + box.width / 2, y: box.y + box.height / 2, left: box.x, top: box.y };
     },
     /** Drags in the picture from its middle. */
     async drag(dx, dy, { button = 'left', from = [0, 0] } = {}) {
