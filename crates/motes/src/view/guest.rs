@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use motes_frame::rgb8;
+use motes_scene::Renderer;
 use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
 
 use super::coarse::{Pace, simple};
+use super::Frames;
 use super::play::Turn;
 use super::state::State;
 use super::{save, schema, systems};
@@ -22,7 +24,7 @@ const AT_ONCE: Duration = Duration::from_millis(60);
 /// After this, what moves is taken to stand still.
 const AT_REST: Duration = Duration::from_millis(150);
 /// How often more frames are looked for.
-const FOLLOWING: Duration = Duration::from_millis(500);
+const FOLLOWING: Duration = Duration::from_millis(250);
 /// Work that takes longer is told of.
 const LONG: Duration = Duration::from_secs(1);
 
@@ -36,16 +38,17 @@ pub(super) struct Guest {
     /// What was drawn last.
     pub seen: Mutex<Option<Seen>>,
     /// How many frames there are; those of a growing source become more.
-    frames: Mutex<Arc<AtomicUsize>>,
-    /// How many there were when it was looked at last.
-    counted: AtomicUsize,
+    frames: Mutex<Arc<Frames>>,
+    /// How many were known of when it was looked at last, and whether those were all.
+    counted: Mutex<(usize, bool)>,
     follows: bool,
 }
 
 /// What pictures are drawn with.
 struct Studio {
     session: Session,
-    pace: Pace,
+    /// How coarse pictures are, by way of seeing.
+    paces: [(Renderer, Pace); 3],
     /// The state that was drawn last, and how well.
     drawn: Option<(u32, Grade)>,
     /// How long the last exact picture took.
@@ -83,12 +86,13 @@ impl Guest {
     ///
     /// # Errors
     /// It cannot be.
-    pub fn new(mut session: Session, frames: Arc<AtomicUsize>, follows: bool) -> Result<Self> {
+    pub fn new(mut session: Session, frames: Arc<Frames>, follows: bool) -> Result<Self> {
         let state = State::new(session.scene().clone());
         let seen = session.survey(&crate::Quiet)?;
         let studio = Studio {
             session,
-            pace: Pace::default(),
+            paces: [Renderer::Spheres, Renderer::Surface, Renderer::Density]
+                .map(|renderer| (renderer, Pace::before(renderer))),
             drawn: None,
             exact_took: Duration::MAX,
             since: Instant::now(),
@@ -99,7 +103,7 @@ impl Guest {
             closed: AtomicBool::new(false),
             studio: Mutex::new(studio),
             seen: Mutex::new(Some(seen)),
-            counted: AtomicUsize::new(frames.load(Ordering::Acquire)),
+            counted: Mutex::new(frames.get()),
             frames: Mutex::new(frames),
             follows,
         })
@@ -115,7 +119,7 @@ impl Guest {
 
     /// How many frames there are.
     pub fn frame_count(&self) -> usize {
-        lock(&self.frames).load(Ordering::Acquire)
+        lock(&self.frames).get().0
     }
 
     /// Goes on with other sources, from their first frame.
@@ -129,8 +133,8 @@ impl Guest {
         let frames = session.frames(&crate::Quiet)?;
         let mut studio = lock(&self.studio);
         studio.session = session.share();
-        *lock(&self.frames) = Arc::new(AtomicUsize::new(frames));
-        self.counted.store(frames, Ordering::Release);
+        *lock(&self.frames) = Frames::new(frames, true);
+        *lock(&self.counted) = (frames, true);
         self.change(|state| {
             state.rename(rename);
             state.go_to(0);
@@ -170,23 +174,23 @@ impl Guest {
         }
     }
 
-    /// Goes to the newest frame, if there are more than before and the last one was shown.
-    fn keep_up(&self, tell: &(dyn Fn(Value) + Sync)) {
-        let count = self.frame_count();
-        let before = self.counted.swap(count, Ordering::AcqRel);
-        if count == before {
-            return;
-        }
-        let last = |count: usize| u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX);
-        let gone = self.change(|state| {
-            if state.scene().image.frame >= last(before) && state.running.is_none() {
-                state.go_to(last(count));
-            }
-            Ok(())
-        });
-        if gone.is_ok() {
+    /// Tells if there are more frames than before. Who follows and has seen the last one gets the new last
+    /// one. Gives when to look again.
+    fn keep_up(&self, tell: &(dyn Fn(Value) + Sync)) -> Option<Duration> {
+        let now = lock(&self.frames).get();
+        let before = std::mem::replace(&mut *lock(&self.counted), now);
+        if now != before {
+            let last = |count: usize| u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX);
+            let _ = self.change(|state| {
+                let at_end = state.scene().image.frame >= last(before.0);
+                if self.follows && before.1 && at_end && state.running.is_none() {
+                    state.go_to(last(now.0));
+                }
+                Ok(())
+            });
             self.tell_scene(tell);
         }
+        (self.follows || !now.1).then_some(FOLLOWING)
     }
 
     fn tell_scene(&self, tell: &(dyn Fn(Value) + Sync)) {
@@ -221,7 +225,7 @@ impl Guest {
         tell: &(dyn Fn(Value) + Sync),
     ) -> Result<(Look, Duration)> {
         let of = match grade {
-            Grade::Coarse => studio.pace.coarse(scene),
+            Grade::Coarse => studio.pace(scene).coarse(scene),
             Grade::Simple => simple(scene),
             Grade::Exact => scene.clone(),
         };
@@ -232,7 +236,12 @@ impl Guest {
     }
 
     /// Which picture comes next of a state, and whether it is the last of it.
-    fn grade(&self, studio: &Studio, number: u32, moving: Moving) -> Option<(Grade, Next)> {
+    fn grade(
+        &self,
+        (studio, whole): (&Studio, bool),
+        number: u32,
+        moving: Moving,
+    ) -> Option<(Grade, Next)> {
         let before = studio.drawn.filter(|(drawn, _)| *drawn == number).map(|(_, grade)| grade);
         let rests = studio.since.elapsed() >= AT_REST;
         let quick = studio.exact_took < AT_ONCE;
@@ -244,7 +253,7 @@ impl Guest {
             (None, _) => (Grade::Coarse, Next::Now),
             (Some(Grade::Exact), _) => return None,
             (Some(_), Moving::Dragged) if !rests => return None,
-            (Some(Grade::Coarse), _) if !studio.pace.is_whole() && !quick => {
+            (Some(Grade::Coarse), _) if !whole && !quick => {
                 (Grade::Simple, Next::Now)
             }
             (Some(_), _) => (Grade::Exact, Next::Asked),
@@ -328,8 +337,8 @@ impl View for Guest {
         if link.anew {
             studio.drawn = None;
         }
-        self.keep_up(tell);
-        let wait = self.go_on(tell).or(self.follows.then_some(FOLLOWING));
+        let look_again = self.keep_up(tell);
+        let wait = self.go_on(tell).or(look_again);
         let (scene, number, moving) = {
             let state = lock(&self.state);
             let moving = match (state.running.is_some(), state.moving()) {
@@ -340,7 +349,8 @@ impl View for Guest {
             (state.seen(), state.number, moving)
         };
         let idle = Step { picture: None, next: wait.map_or(Next::Asked, Next::After) };
-        let Some((grade, next)) = self.grade(studio, number, moving) else { return idle };
+        let whole = studio.pace(&scene).is_whole();
+        let Some((grade, next)) = self.grade((studio, whole), number, moving) else { return idle };
         if studio.drawn.is_none_or(|(drawn, _)| drawn != number) {
             studio.since = Instant::now();
         }
@@ -376,10 +386,7 @@ impl View for Guest {
             let watch = Saving { closed: &self.closed };
             match file {
                 "scene.toml" => Ok(super::command::scene_text(&scene).into_bytes()),
-                "film.mp4" => {
-                    let session = self.own_session(scene)?;
-                    save::film(session, (wanted, self.frame_count()), &watch)
-                }
+                "film.mp4" => save::film(self.own_session(scene)?, wanted, &watch),
                 file => save::picture(&mut self.own_session(scene)?, file, &watch),
             }
         };
@@ -392,6 +399,12 @@ impl View for Guest {
 }
 
 impl Studio {
+    /// How coarse pictures of a scene are.
+    fn pace(&mut self, scene: &Scene) -> &mut Pace {
+        let at = self.paces.iter().position(|(renderer, _)| *renderer == scene.renderer);
+        &mut self.paces[at.unwrap_or(0)].1
+    }
+
     /// Learns from a picture how the next ones are to be.
     fn learn(&mut self, scene: &Scene, (grade, (look, took)): (Grade, &(Look, Duration)), link: Link) {
         match grade {
@@ -399,7 +412,7 @@ impl Studio {
             Grade::Coarse => {
                 let canvas = f64::from(scene.image.width) * f64::from(scene.image.height) / 1e6;
                 let megapixels = look.shown.color().len() as f64 / 1e6;
-                self.pace.learn((megapixels, canvas), *took, link.encoding);
+                self.pace(scene).learn((megapixels, canvas), *took, link.encoding);
             }
             Grade::Simple => {}
         }
