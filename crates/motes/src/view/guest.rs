@@ -209,6 +209,19 @@ impl Guest {
         tell(Value::Object(message));
     }
 
+    /// Finds out what there is to be seen, if that was let go of.
+    fn look_again(&self) {
+        if lock(&self.seen).is_some() {
+            return;
+        }
+        let mut studio = lock(&self.studio);
+        let scene = lock(&self.state).seen();
+        let surveyed = studio.session.set_scene(scene);
+        let seen = surveyed.and_then(|()| studio.session.survey(&crate::Quiet));
+        // What is wrong is told when it is drawn.
+        *lock(&self.seen) = seen.ok();
+    }
+
     /// The message about the scene as it stands.
     pub fn scene_message(&self) -> Map<String, Value> {
         let state = lock(&self.state);
@@ -321,6 +334,7 @@ impl Guest {
 
 impl View for Guest {
     fn hello(&self) -> Map<String, Value> {
+        self.look_again();
         let mut hello = self.scene_message();
         hello.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         hello.insert("schema".into(), schema::schema());
@@ -406,6 +420,7 @@ impl View for Guest {
     fn rest(&self) {
         let mut studio = lock(&self.studio);
         studio.session = studio.session.share();
+        *lock(&self.seen) = None;
     }
 
     fn close(&self) {
