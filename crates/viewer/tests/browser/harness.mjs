@@ -1,5 +1,6 @@
 // What the browser tests share: a running `motes view`, a browser, and words for what is to be seen.
 //
+// They run by `cargo test -p motes --test browser`, or alone by `node --test crates/viewer/tests/browser/*.test.mjs`:
 // MOTES names the program, MOTES_BROWSER a folder that has playwright-core in its node_modules, CHROMIUM the
 // browser (else it is looked for in PATH).
 import { execFileSync, spawn } from 'node:child_process';
