@@ -9,7 +9,7 @@ use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_grid::RadiusClasses;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show};
+use motes_scene::{Bounds, CapColor, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Section, Show};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 
@@ -327,6 +327,10 @@ impl Session {
             let still = own > 0 && self.series.len() > 1 && self.series[i].frames(&report)? == 1;
             let own = if still { 0 } else { own };
             let mut wanted = wanted(system);
+            let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
+            if self.scene.sections_of(i).any(|(_, section)| by_property(section)) {
+                wanted = Wanted::All;
+            }
             let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
             if masked && let Wanted::Only(columns) = &mut wanted {
                 columns.push(names::PARTICLE_MASK.into());
@@ -357,7 +361,7 @@ impl Session {
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let entries = Entries::new(others);
+        let entries = Entries::new(others, &self.scene.light);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
         let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let corners = boxes.fold(nothing, |[low, high], b| {
@@ -395,11 +399,11 @@ impl Session {
     ) -> Result<Frame> {
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let entries = Entries::new(loaded);
+        let entries = Entries::new(loaded, &self.scene.light);
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
         let systems = &entries.spheres;
-        let view = View { rays: &rays, systems, paint: &entries, lights: &lights };
+        let view = View { rays: &rays, systems, paint: &entries, lights: &lights, casters: &entries.casters };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),

@@ -8,10 +8,11 @@ use motes_grid::{BlockRanges, Clip, Filter, Grid, Params, RadiusClasses, Resolut
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, ColorBy, Renderer, Scene, System};
+use motes_scene::{Bounds, CapColor, ColorBy, Renderer, Scene, System};
 use motes_spheres::Spheres;
 
 use crate::annotate::box_shown;
+use crate::caps::Caps;
 use crate::cut::{Body, Keep, Pass};
 use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::Rule;
@@ -30,6 +31,8 @@ pub(crate) struct Loaded {
     /// What is visible of all passes, where there are several.
     merged: Vec<Visibility>,
     pub paint: Paint,
+    /// The colours of what the sections lay open.
+    pub caps: Caps,
 }
 
 impl Loaded {
@@ -52,7 +55,7 @@ impl Loaded {
         };
         let scale = system.radius_scale as f32;
         let shift = DVec3::from_array(particles.origin) - origin;
-        let keeps = asks_for_positions(&particles, system);
+        let keeps = asks_for_positions(&particles, (scene, system));
         let own = Arc::get_mut(&mut particles).filter(|_| !keeps);
         let mut positions = match own.map(Particles::take_positions) {
             Some(positions) => Cow::Owned(positions),
@@ -71,8 +74,8 @@ impl Loaded {
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
         }
         let sim_box = box_shown(&particles, scene.overlay.r#box);
-        let (passes, merged) = (Vec::new(), Vec::new());
-        let mut loaded = Self { number, particles, sim_box, classes, passes, merged, paint };
+        let (passes, merged, caps) = (Vec::new(), Vec::new(), Caps::default());
+        let mut loaded = Self { number, particles, sim_box, classes, passes, merged, paint, caps };
         loaded.cut(scene, origin)?;
         Ok(loaded)
     }
@@ -82,8 +85,9 @@ impl Loaded {
         (particles, paint): (Arc<Particles>, Paint),
         (classes, visible): (RadiusClasses, Vec<Visibility>),
     ) -> Self {
-        let passes = vec![Pass::uncut(&classes, visible)];
-        Self { number: 0, particles, sim_box: None, classes, passes, merged: Vec::new(), paint }
+        let (number, passes) = (0, vec![Pass::uncut(&classes, visible)]);
+        let (sim_box, merged, caps) = (None, Vec::new(), Caps::default());
+        Self { number, particles, sim_box, classes, passes, merged, paint, caps }
     }
 
     /// Goes over to the sections of `scene`, in which nothing else has changed.
@@ -111,6 +115,9 @@ impl Loaded {
             let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
             self.merged = self.classes.grids.iter().map(of).collect();
         }
+        let visible = self.boxes(origin).into_iter().reduce(Bounds::union);
+        let diagonal = visible.map_or(1.0, |bounds| bounds.diagonal());
+        self.caps = Caps::new((scene, number), &self.particles, diagonal)?;
         Ok(())
     }
 
@@ -191,6 +198,11 @@ impl Loaded {
         })
     }
 
+    /// As [`Loaded::spheres`], without cuts.
+    pub fn uncut_spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
+        self.passes.iter().map(|pass| Spheres::new(&self.classes, pass.all()))
+    }
+
     /// Boxes around what is visible, with radii, in world coordinates.
     pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
         let mut boxes = Vec::new();
@@ -253,14 +265,19 @@ pub(crate) fn visibility(
 }
 
 /// Whether colours or what is visible go by the particles' positions.
-fn asks_for_positions(particles: &Particles, system: &System) -> bool {
+fn asks_for_positions(particles: &Particles, (scene, system): (&Scene, &System)) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {
         ColorBy::Property(name) => by_position(name),
         _ => false,
     };
+    let caps = scene.section.iter().any(|section| match &section.cap {
+        CapColor::Property(name) => by_position(name),
+        _ => false,
+    });
     color
+        || caps
         || !system.r#where.trim().is_empty()
         || system.filter.iter().any(|filter| by_position(&filter.property))
 }
