@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use glam::DVec3;
 use motes_frame::{Background, Curve, Frame, Tone};
-use motes_grid::Visibility;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series, SimulationBox};
 use motes_scene::{
-    Bounds, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show,
+    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene,
+    Section, Show,
 };
 
 use crate::annotate::{Annotated, annotations};
@@ -20,7 +20,7 @@ use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::system::Loaded;
+use crate::system::{Cuts, Loaded};
 use crate::{Error, Result};
 
 /// Whether a picture carries depth, normal, id and system besides colour.
@@ -468,6 +468,10 @@ impl Session {
             let still = own > 0 && self.series.len() > 1 && series.frames(&report)? == 1;
             let own = if still { 0 } else { own };
             let mut wanted = wanted(system);
+            let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
+            if self.scene.sections_of(i).any(|(_, section)| by_property(section)) {
+                wanted = Wanted::All;
+            }
             let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
             if masked && let Wanted::Only(columns) = &mut wanted {
                 columns.push(names::PARTICLE_MASK.into());
@@ -560,11 +564,11 @@ pub(crate) struct Seen {
 
 /// What boxes are made around.
 #[derive(PartialEq)]
-struct Framed(Same<Vec<Visibility>>, Option<SimulationBox>, DVec3);
+struct Framed(Same<Cuts>, Option<SimulationBox>, DVec3);
 
 impl Framed {
     fn of(loaded: &Loaded, origin: DVec3) -> Self {
-        Self(Same(loaded.visible.clone()), loaded.sim_box, origin)
+        Self(Same(loaded.cuts.clone()), loaded.sim_box, origin)
     }
 }
 
@@ -649,5 +653,5 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
-    stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));
+    stats.bytes.insert("visibility", sum(&Loaded::visibility_bytes));
 }

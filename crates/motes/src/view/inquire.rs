@@ -7,11 +7,12 @@ use glam::{DVec3, Vec3};
 use motes_grid::{Grid, Visibility};
 use motes_particles::read::names;
 use motes_particles::{Particles, Values, select};
-use motes_scene::{CameraView, Component, Element, Renderer, Scene};
-use motes_spheres::{Counts, Packet, Spheres};
+use motes_scene::{CameraView, Component, Element, Light, Renderer, Scene};
+use motes_spheres::{Counts, Packet};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use crate::entries::Entries;
 use crate::paint::{Paint, find_property};
 use crate::session::Seen;
 use crate::system::Loaded;
@@ -43,9 +44,9 @@ pub(super) fn pick(scene: &Scene, seen: &Seen, at: [f64; 2]) -> Result<Value> {
     let ray = view.rays(seen.origin).ray(x, y);
     let liquid = scene.renderer != Renderer::Spheres;
     let found = match (&seen.loaded[..], liquid) {
-        (all, false) => sphere_at(all, ray, seen.origin),
+        (all, false) => sphere_at(all, ray, (&scene.light, seen.origin)),
         ([], true) => None,
-        ([liquid, others @ ..], true) => sphere_at(others, ray, seen.origin)
+        ([liquid, others @ ..], true) => sphere_at(others, ray, (&scene.light, seen.origin))
             .or_else(|| ball_at(liquid, ray, (scene.surface.ball as f32, seen.origin))),
     };
     Ok(json!({"picked": found.map(|found| describe(scene, &found))}))
@@ -62,16 +63,16 @@ fn view_of(scene: &Scene, seen: &Seen) -> Result<CameraView> {
 fn sphere_at<'a>(
     loaded: &'a [Loaded],
     (origin, direction): (Vec3, Vec3),
-    about: DVec3,
+    (light, about): (&Light, DVec3),
 ) -> Option<Found<'a>> {
-    let systems: Vec<Spheres<'_>> = loaded.iter().map(Loaded::spheres).collect();
+    let entries = Entries::new(loaded, light);
     let mut packet = Packet::new();
     packet.push(origin, direction);
     dispatch!(Level::new(), simd =>
-        motes_spheres::trace(simd, &mut packet, &systems, &mut Counts::default()));
-    let (depth, system, slot) = packet.hit(0)?;
-    let (grid, place) = systems.get(usize::from(system))?.locate(slot);
-    Some(found(loaded.get(usize::from(system))?, (grid, place), (depth, about)))
+        motes_spheres::trace(simd, &mut packet, &entries.spheres, &mut Counts::default()));
+    let (depth, entry, slot) = packet.hit(0)?;
+    let (grid, place) = entries.spheres.get(usize::from(entry))?.locate(slot);
+    Some(found(entries.system(entry), (grid, place), (depth, about)))
 }
 
 fn found<'a>(
