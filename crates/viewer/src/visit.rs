@@ -1,8 +1,10 @@
-//! One client's view while it is here, and for some minutes after: a thread that answers, and one that
-//! draws whenever something has changed and the client has taken what was sent before.
+//! One client's view while it is here, and for some minutes after: a thread that answers, one that
+//! draws whenever something has changed and the client has taken what was sent before, and one that encodes
+//! a picture while the next is drawn.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -46,7 +48,7 @@ struct Gate {
     /// The connection, if there is one, and its number.
     outbox: Option<mpsc::Sender<Message>>,
     connection: u64,
-    /// Serials of frames that are under way, when they were sent, and how.
+    /// Serials of frames that are under way, and when they were drawn.
     under_way: VecDeque<(u32, Instant)>,
     serial: u32,
     /// Something has changed.
@@ -87,8 +89,11 @@ impl Visit {
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let own = visit.clone();
         thread("answers").spawn(move || own.answer_all(asked))?;
+        let (pictures, drawn) = sync_channel(0);
         let own = visit.clone();
-        thread("pictures").spawn(move || own.draw_all())?;
+        thread("pictures").spawn(move || own.draw_all(&pictures))?;
+        let own = visit.clone();
+        thread("frames").spawn(move || drawn.iter().for_each(|drawn| own.send(&drawn)))?;
         Ok(visit)
     }
 
@@ -186,14 +191,15 @@ impl Visit {
         }
     }
 
-    fn draw_all(&self) {
+    fn draw_all(&self, pictures: &SyncSender<Drawn>) {
         while let Some(link) = self.wait() {
             let tell = |value| self.tell_value(value);
             let drawn = catch_unwind(AssertUnwindSafe(|| self.view.draw(link, &tell)));
             let next = match drawn {
                 Ok(step) => {
-                    if let Some(picture) = step.picture {
-                        self.send(&picture);
+                    let drawn = step.picture.map(|picture| self.under_way(picture));
+                    if drawn.is_some_and(|drawn| pictures.send(drawn).is_err()) {
+                        return;
                     }
                     step.next
                 }
@@ -240,21 +246,26 @@ impl Visit {
         }
     }
 
-    /// Encodes a picture and sends it.
-    fn send(&self, picture: &Picture) {
-        let (serial, quality) = {
-            let mut gate = self.gate();
-            gate.serial = gate.serial.wrapping_add(1);
-            (gate.serial, gate.quality)
-        };
+    /// Counts a picture among the frames that are under way.
+    fn under_way(&self, picture: Picture) -> Drawn {
+        let mut gate = self.gate();
+        gate.serial = gate.serial.wrapping_add(1);
+        let serial = gate.serial;
+        gate.under_way.push_back((serial, Instant::now()));
+        Drawn { picture, serial, quality: gate.quality, connection: gate.connection }
+    }
+
+    /// Encodes a picture and sends it, if the client for whom it was drawn is still there.
+    fn send(&self, drawn: &Drawn) {
+        let Drawn { picture, serial, quality, connection } = drawn;
         let pixels = usize::from(picture.size.0) * usize::from(picture.size.1);
         let codec = match picture.exact && !picture.playing {
-            true if quality >= LOSSLESS_FROM && pixels <= LOSSLESS_PIXELS => Codec::Png,
+            true if *quality >= LOSSLESS_FROM && pixels <= LOSSLESS_PIXELS => Codec::Png,
             true => Codec::Jpeg(NEARLY_LOSSLESS),
-            false => Codec::Jpeg(quality),
+            false => Codec::Jpeg(*quality),
         };
         let start = Instant::now();
-        let bytes = match frame(picture, serial, codec) {
+        let bytes = match frame(picture, *serial, codec) {
             Ok(bytes) => bytes,
             Err(error) => {
                 let notice = json!({"is": "notice", "severity": "error", "text": error});
@@ -263,14 +274,24 @@ impl Visit {
         };
         let took = start.elapsed();
         let mut gate = self.gate();
-        if codec == Codec::Jpeg(quality) {
+        if codec == Codec::Jpeg(*quality) {
             gate.encoding = took.mul_f64(1e6 / pixels as f64);
         }
-        let Some(outbox) = gate.outbox.clone() else { return };
-        gate.under_way.push_back((serial, Instant::now()));
+        let outbox = gate.outbox.clone().filter(|_| gate.connection == *connection);
         drop(gate);
-        let _ = outbox.blocking_send(Message::Binary(bytes.into()));
+        if let Some(outbox) = outbox {
+            let _ = outbox.blocking_send(Message::Binary(bytes.into()));
+        }
     }
+}
+
+/// A picture that is to be sent.
+struct Drawn {
+    picture: Picture,
+    serial: u32,
+    quality: u8,
+    /// The connection that it was drawn for.
+    connection: u64,
 }
 
 /// The answer to request `id`.

@@ -156,8 +156,10 @@ impl Client<'_> {
 
     /// The next message; none if nothing comes, or the connection has ended.
     fn next(&mut self) -> Option<Message> {
-        let next = tokio::time::timeout(Duration::from_secs(5), self.socket.next());
-        self.running.runtime.block_on(async { next.await.ok()??.ok() })
+        self.running.runtime.block_on(async {
+            let next = tokio::time::timeout(Duration::from_secs(5), self.socket.next());
+            next.await.ok()??.ok()
+        })
     }
 
     /// The next text for which something holds.
@@ -275,8 +277,8 @@ fn two_frames_are_under_way_and_no_more() {
         let until = Instant::now() + Duration::from_millis(200);
         while Instant::now() < until {
             let left = until.saturating_duration_since(Instant::now());
-            let next = tokio::time::timeout(left, client.socket.next());
-            match client.running.runtime.block_on(async { next.await }) {
+            let next = async { tokio::time::timeout(left, client.socket.next()).await };
+            match client.running.runtime.block_on(next) {
                 Ok(Some(Ok(Message::Binary(_)))) => return false,
                 Ok(Some(Ok(_))) | Err(_) => {}
                 Ok(other) => panic!("{other:?}"),
