@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use axum::extract::ws::Message;
 use serde_json::{Map, Value, json};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use crate::encode::{Codec, frame};
 use crate::{Link, Next, Picture, Request, View};
@@ -48,6 +48,8 @@ struct Gate {
     /// The connection, if there is one, and its number.
     outbox: Option<mpsc::Sender<Message>>,
     connection: u64,
+    /// Tells that connection that there is a newer one.
+    replaced: watch::Sender<bool>,
     /// Serials of frames that are under way, and when they were drawn.
     under_way: VecDeque<(u32, Instant)>,
     serial: u32,
@@ -61,6 +63,8 @@ struct Gate {
     left: Instant,
     encoding: Duration,
     quality: u8,
+    /// Whether the view has let go of what can be made again.
+    rested: bool,
     closed: bool,
 }
 
@@ -74,6 +78,7 @@ impl Visit {
         let gate = Gate {
             outbox: None,
             connection: 0,
+            replaced: watch::channel(false).0,
             under_way: VecDeque::new(),
             serial: 0,
             woken: true,
@@ -82,6 +87,7 @@ impl Visit {
             left: Instant::now(),
             encoding: Duration::ZERO,
             quality: *QUALITY.end(),
+            rested: false,
             closed: false,
         };
         let (gate, wake) = (Mutex::new(gate), Condvar::new());
@@ -98,8 +104,8 @@ impl Visit {
     }
 
     /// Connects a client: it is greeted, and gets a picture. A former connection ends. Gives the
-    /// connection's number.
-    pub fn attach(&self, outbox: mpsc::Sender<Message>) -> u64 {
+    /// connection's number, and what will tell it that there is a newer one.
+    pub fn attach(&self, outbox: mpsc::Sender<Message>) -> (u64, watch::Receiver<bool>) {
         let mut hello = self.view.hello();
         hello.insert("is".into(), "hello".into());
         hello.insert("view".into(), self.key.clone().into());
@@ -108,10 +114,13 @@ impl Visit {
         let mut gate = self.gate();
         gate.outbox = Some(outbox);
         gate.connection += 1;
+        let (replaced, is_replaced) = watch::channel(false);
+        std::mem::replace(&mut gate.replaced, replaced).send_replace(true);
+        gate.rested = false;
         gate.under_way.clear();
         (gate.woken, gate.anew) = (true, true);
         self.wake.notify_all();
-        gate.connection
+        (gate.connection, is_replaced)
     }
 
     /// Ends a connection, if it is still the one.
@@ -119,6 +128,17 @@ impl Visit {
         let mut gate = self.gate();
         if gate.connection == connection {
             (gate.outbox, gate.left) = (None, Instant::now());
+        }
+    }
+
+    /// Lets go of what can be made again, once, if nobody has been here for a while.
+    pub fn rest(&self, after: Duration) {
+        let mut gate = self.gate();
+        let rests = gate.outbox.is_none() && !gate.rested && gate.left.elapsed() > after;
+        gate.rested |= rests;
+        drop(gate);
+        if rests {
+            self.view.rest();
         }
     }
 

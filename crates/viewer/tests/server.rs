@@ -79,6 +79,8 @@ impl View for Counter {
         }
     }
 
+    fn rest(&self) {}
+
     fn close(&self) {}
 }
 
@@ -263,6 +265,26 @@ fn a_view_is_asked_and_drawn_and_outlives_its_connection() {
     assert!(save(&format!("layers.npz?view={key}&width=x")).contains("x pixels?"));
     assert!(save(&format!("passwd?view={key}")).starts_with("HTTP/1.1 404"));
     assert!(save("layers.npz?view=none").starts_with("HTTP/1.1 404"));
+}
+
+#[test]
+fn a_newer_connection_takes_over_from_one_that_hangs() {
+    let server = Running::start();
+    let mut client = server.enter();
+    let key = client.hear(|_| true)["view"].as_str().unwrap().to_owned();
+    // It takes nothing of thousands of answers, until no more can be sent.
+    server.runtime.block_on(async {
+        for id in 0..3000 {
+            let text = json!({"id": id, "do": "x".repeat(2000)}).to_string();
+            let send = client.socket.feed(Message::text(text));
+            if tokio::time::timeout(Duration::from_millis(300), send).await.is_err() {
+                break;
+            }
+        }
+    });
+    let mut again = server.connect(&format!("token={}&view={key}", server.token), None).unwrap();
+    again.say(&json!({"id": 1, "do": "add"}));
+    assert!(again.hear(|v| v["re"] == 1 && v.get("error").is_none())["count"].is_number());
 }
 
 #[test]

@@ -35,6 +35,8 @@ pub(super) struct Guest {
     newest: AtomicU32,
     closed: AtomicBool,
     studio: Mutex<Studio>,
+    /// The sources, for files that are saved while something is drawn.
+    sources: Mutex<Session>,
     /// What was drawn last.
     pub seen: Mutex<Option<Seen>>,
     /// How many frames there are; those of a growing source become more.
@@ -89,6 +91,7 @@ impl Guest {
     pub fn new(mut session: Session, frames: Arc<Frames>, follows: bool) -> Result<Self> {
         let state = State::new(session.scene().clone());
         let seen = session.survey(&crate::Quiet)?;
+        let sources = Mutex::new(session.share());
         let studio = Studio {
             session,
             paces: [Renderer::Spheres, Renderer::Surface, Renderer::Density]
@@ -102,6 +105,7 @@ impl Guest {
             state: Mutex::new(state),
             closed: AtomicBool::new(false),
             studio: Mutex::new(studio),
+            sources,
             seen: Mutex::new(Some(seen)),
             counted: Mutex::new(frames.get()),
             frames: Mutex::new(frames),
@@ -131,8 +135,14 @@ impl Guest {
         scene.system.iter_mut().for_each(|system| system.source = rename(&system.source));
         let mut session = Session::open(scene, None)?;
         let frames = session.frames(&crate::Quiet)?;
+        // What is being drawn is of no use any more.
+        self.change(|state| {
+            state.changed();
+            Ok(())
+        })?;
         let mut studio = lock(&self.studio);
         studio.session = session.share();
+        *lock(&self.sources) = session;
         *lock(&self.frames) = Frames::new(frames, true);
         *lock(&self.counted) = (frames, true);
         self.change(|state| {
@@ -144,7 +154,7 @@ impl Guest {
 
     /// A session of its own, for files.
     fn own_session(&self, scene: Scene) -> Result<Session> {
-        let mut session = lock(&self.studio).session.share();
+        let mut session = lock(&self.sources).share();
         session.set_scene(scene)?;
         Ok(session)
     }
@@ -197,6 +207,19 @@ impl Guest {
         let mut message = self.scene_message();
         message.insert("is".into(), "scene".into());
         tell(Value::Object(message));
+    }
+
+    /// Finds out what there is to be seen, if that was let go of.
+    fn look_again(&self) {
+        if lock(&self.seen).is_some() {
+            return;
+        }
+        let mut studio = lock(&self.studio);
+        let scene = lock(&self.state).seen();
+        let surveyed = studio.session.set_scene(scene);
+        let seen = surveyed.and_then(|()| studio.session.survey(&crate::Quiet));
+        // What is wrong is told when it is drawn.
+        *lock(&self.seen) = seen.ok();
     }
 
     /// The message about the scene as it stands.
@@ -311,6 +334,7 @@ impl Guest {
 
 impl View for Guest {
     fn hello(&self) -> Map<String, Value> {
+        self.look_again();
         let mut hello = self.scene_message();
         hello.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         hello.insert("schema".into(), schema::schema());
@@ -391,6 +415,12 @@ impl View for Guest {
             }
         };
         made().map_err(|error: Error| error.to_string())
+    }
+
+    fn rest(&self) {
+        let mut studio = lock(&self.studio);
+        studio.session = studio.session.share();
+        *lock(&self.seen) = None;
     }
 
     fn close(&self) {
