@@ -231,6 +231,7 @@ impl Session {
             shown,
             stats,
             scene: scene.to_toml(),
+            view: resolved.view,
             transparent: self.scene.image.transparent,
         })
     }
