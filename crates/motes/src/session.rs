@@ -277,6 +277,7 @@ impl Session {
             shown,
             stats,
             scene: drawn.scene.to_toml(),
+            view: drawn.resolved.view,
             transparent: self.scene.image.transparent,
         })
     }

@@ -198,7 +198,7 @@ fn scene(random: &mut Random, round: usize) -> Scene {
 fn shafts_find_what_brute_force_finds() {
     let mut random = Random(7);
     let mut seen = [0; 2];
-    for round in 0..60 {
+    for round in 0..150 {
         let scene = scene(&mut random, round);
         let systems = scene.systems();
         let axis = if round < 6 {

@@ -173,8 +173,10 @@ fn check(name: &str, cuts: &Cuts, rays: &Rays) -> usize {
     let lights = lights();
     let projected = cuts.render(rays, &lights, settings(Primary::Project));
     let traced = cuts.render(rays, &lights, settings(Primary::Trace));
-    assert_eq!(projected.center, traced.center, "{name}: both ways");
-    assert_eq!(projected.color, traced.color, "{name}: both ways");
+    for (i, both) in projected.center.iter().zip(&traced.center).enumerate() {
+        assert_eq!(both.0, both.1, "{name}: pixel {i}");
+    }
+    assert!(projected.color == traced.color, "{name}: light");
     let (mut caps, mut doubts) = (0, 0);
     for (i, hit) in projected.center.iter().enumerate() {
         let (x, y) = (i as u32 % SIZE.0, i as u32 / SIZE.0);
