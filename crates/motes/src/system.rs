@@ -108,19 +108,6 @@ impl Loaded {
         Self { number, particles, sim_box, classes, cuts, paint, caps }
     }
 
-    /// Goes over to the sections of `scene`, in which nothing else has changed.
-    ///
-    /// # Errors
-    /// A section makes no sense here.
-    pub fn cut(&mut self, scene: &Scene, origin: DVec3) -> Result<()> {
-        let number = usize::from(self.number);
-        let body = (&*self.particles, &*self.classes);
-        Arc::make_mut(&mut self.cuts).set(body, (scene, number), origin)?;
-        let diagonal = diagonal(&self.classes, self.cuts.visible());
-        self.caps = Arc::new(Caps::new((scene, number), &self.particles, diagonal)?);
-        Ok(())
-    }
-
     /// What is visible of the particles, grid by grid.
     pub fn visible(&self) -> &[Visibility] {
         self.cuts.visible()

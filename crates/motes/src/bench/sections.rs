@@ -19,7 +19,7 @@ use super::shot::{Shot, Studio, White};
 use super::source::{Line, Source, poses, read};
 use super::table::{Cell, Table};
 use super::{Tables, chosen, median, pool, timed};
-use crate::session::instruction_set;
+use crate::drawing::instruction_set;
 use crate::system::visibility;
 use crate::{Error, Result, Watch, radius};
 
