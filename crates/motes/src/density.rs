@@ -21,7 +21,7 @@ use crate::memo::{Memo, Same};
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
-use crate::system::Loaded;
+use crate::system::{Cuts, Loaded};
 use crate::{Error, Result, Watch};
 
 /// The visible particles of a system, one after the other.
@@ -148,8 +148,8 @@ pub(crate) struct Made {
 /// Fields from one picture to the next.
 pub(crate) struct Fields {
     /// By what is visible, how it is made, and whether with masks.
-    made: Memo<(Same<Vec<Visibility>>, Params, bool), Made>,
-    mean_radii: Memo<Same<Vec<Visibility>>, f64>,
+    made: Memo<(Same<Cuts>, Params, bool), Made>,
+    mean_radii: Memo<Same<Cuts>, f64>,
 }
 
 impl Default for Fields {
@@ -217,7 +217,7 @@ impl Cast<'_> {
     fn made(&self, bounds: Bounds, stats: &mut Stats) -> Arc<Made> {
         let longest = (bounds.max - bounds.min).max_element();
         let masked = self.scene.density.mask;
-        let visible = || Same(self.system.visible.clone());
+        let visible = || Same(self.system.cuts.clone());
         let mean_radius = || Ok::<_, Infallible>(mean_radius(self.system));
         let Ok(mean_radius) = self.fields.mean_radii.get(visible(), mean_radius);
         let params = params(self.scene, (*mean_radius, longest));

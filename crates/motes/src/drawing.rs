@@ -9,13 +9,15 @@ use motes_grid::Visibility;
 use motes_scene::{Bounds, Renderer, Resolved, Scene};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
+use rayon::prelude::*;
 
 use crate::density::{Cast, Fields};
+use crate::entries::Entries;
 use crate::liquid::{Boundaries, Liquid, Matter};
 use crate::memo::{Memo, Same};
 use crate::scenery::Others;
 use crate::stats::Stats;
-use crate::system::Loaded;
+use crate::system::{Cuts, Loaded};
 use crate::{Error, Result, Watch};
 
 /// What is drawn.
@@ -37,7 +39,7 @@ pub(crate) struct Kept {
     renderer: motes_spheres::Renderer,
     boundaries: Boundaries,
     fields: Fields,
-    media: Memo<Same<Vec<Visibility>>, Vec<(usize, Arc<Vec<Visibility>>)>>,
+    media: Memo<Same<Cuts>, Vec<(usize, Vec<Visibility>)>>,
 }
 
 impl Default for Kept {
@@ -73,15 +75,14 @@ impl Drawing<'_> {
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<_> = others.iter().map(Loaded::spheres).collect();
-        let paint = Paints(others);
+        let entries = Entries::new(others, &scene.light);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
         let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let corners = boxes.fold(nothing, |[low, high], b| {
             [low.min((b.min - origin).as_vec3()), high.max((b.max - origin).as_vec3())]
         });
-        let others = Others { systems: &systems, paint: &paint, bounds: corners };
-        let others = (!systems.is_empty()).then_some(others);
+        let others = Others { systems: &entries.spheres, paint: &entries, bounds: corners };
+        let others = (!entries.spheres.is_empty()).then_some(others);
         if scene.renderer == Renderer::Density {
             let fields = &self.kept.fields;
             let cast = Cast { scene, system, resolved, bounds, origin, level, others, fields };
@@ -91,7 +92,7 @@ impl Drawing<'_> {
         let types = match scene.surface.media {
             motes_scene::surface::Media::One => Arc::default(),
             motes_scene::surface::Media::Types => {
-                self.kept.media.get(Same(system.visible.clone()), || system.visible_by_type())?
+                self.kept.media.get(Same(system.cuts.clone()), || system.visible_by_type())?
             }
         };
         if types.len() > MOST_MEDIA {
@@ -100,7 +101,8 @@ impl Drawing<'_> {
                 types.len()
             )));
         }
-        let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
+        let media = types.iter().map(|(kind, of)| (*kind, matter.only(system, (*kind, of))));
+        let media: Vec<_> = media.collect();
         let media = &media[..];
         let boundaries = Some(&self.kept.boundaries);
         let liquid =
@@ -112,10 +114,11 @@ impl Drawing<'_> {
         let Self { loaded, resolved, origin, .. } = *self;
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<_> = loaded.iter().map(Loaded::spheres).collect();
+        let entries = Entries::new(loaded, &self.scene.light);
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
-        let view = View { rays: &rays, systems: &systems, paint: &Paints(loaded), lights: &lights };
+        let (systems, casters) = (&entries.spheres, &entries.casters);
+        let view = View { rays: &rays, systems, paint: &entries, lights: &lights, casters };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),
@@ -141,39 +144,19 @@ impl Drawing<'_> {
         stats.counts.insert("tests", traced.counts.tests);
         stats.counts.insert("spheres", traced.counts.spheres);
         let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
-        if layers { with_layers(frame, &traced.center, loaded) } else { Ok(frame) }
+        if layers { with_layers(frame, &traced.center, &entries) } else { Ok(frame) }
     }
 }
 
-/// The colours of all systems.
-struct Paints<'a>(&'a [Loaded]);
-
-impl motes_spheres::Paint for Paints<'_> {
-    fn color(&self, system: u16, index: u32) -> Vec3 {
-        self.0[system as usize].paint.color(index)
-    }
-
-    fn uniform(&self, system: u16) -> Option<Vec3> {
-        self.0[system as usize].paint.uniform()
-    }
-
-    fn opacity(&self, system: u16, index: u32) -> f32 {
-        self.0[system as usize].paint.opacity.of(index)
-    }
-
-    fn translucent(&self) -> bool {
-        self.0.iter().any(|l| !l.paint.opacity.is_opaque())
-    }
-}
-
-fn with_layers(frame: Frame, center: &[Center], loaded: &[Loaded]) -> Result<Frame> {
+fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
+    // Where nothing is, the system is 0.
+    let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
+    let each = || center.par_iter().with_min_len(1 << 14);
     Ok(frame
-        .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
-        .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
-        .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
-        .with(Layer::System(
-            center.iter().map(|c| loaded.get(c.system as usize).map_or(0, |l| l.number)).collect(),
-        ))?)
+        .with(Layer::Depth(each().map(|c| c.depth).collect()))?
+        .with(Layer::Normal(each().map(|c| c.normal).collect()))?
+        .with(Layer::Id(each().map(|c| c.id).collect()))?
+        .with(Layer::System(each().map(system).collect()))?)
 }
 
 /// The name of an instruction set.

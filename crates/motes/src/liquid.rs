@@ -24,7 +24,7 @@ use crate::paint;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
-use crate::system::Loaded;
+use crate::system::{Cuts, Loaded};
 use crate::{Error, Result, Watch};
 
 /// Rows of the light's own view.
@@ -34,8 +34,8 @@ const SHADOW_ROWS: u32 = 1024;
 #[derive(Clone, Copy)]
 pub(crate) struct Matter<'a> {
     pub particles: Particles<'a>,
-    /// What they are of; none where they are not of a system's grids.
-    pub identity: Option<&'a Arc<Vec<Visibility>>>,
+    /// What they are of, and which of its types if not all; none where they are not of a system's grids.
+    pub identity: Option<(&'a Arc<Cuts>, Option<usize>)>,
     /// How many of them are visible.
     pub visible: usize,
     pub mean_radius: f64,
@@ -55,8 +55,8 @@ impl<'a> Matter<'a> {
         });
         let greatest = grids.iter().map(|g| g.greatest_radius).fold(0.0, f32::max);
         Self {
-            particles: Particles::Grids(grids, &system.visible),
-            identity: Some(&system.visible),
+            particles: Particles::Grids(grids, system.visible()),
+            identity: Some((&system.cuts, None)),
             visible: system.count_visible(),
             mean_radius: sum / count.max(1) as f64,
             greatest_radius: f64::from(greatest),
@@ -68,9 +68,9 @@ impl<'a> Matter<'a> {
 
 impl<'a> Matter<'a> {
     /// The same of fewer particles of its system.
-    pub fn only(self, system: &'a Loaded, visible: &'a Arc<Vec<Visibility>>) -> Self {
+    pub fn only(self, system: &'a Loaded, (kind, visible): (usize, &'a [Visibility])) -> Self {
         let particles = Particles::Grids(&system.classes.grids, visible);
-        let identity = Some(visible);
+        let identity = Some((&system.cuts, Some(kind)));
         let visible = visible.iter().map(Visibility::visible).sum();
         Self { particles, identity, visible, ..self }
     }
@@ -84,7 +84,7 @@ pub(crate) struct Setting {
 }
 
 /// Boundaries of liquids from one picture to the next, by what is visible and how spans are made.
-pub(crate) type Boundaries = Memo<(Same<Vec<Visibility>>, Params, f64), Boundary>;
+pub(crate) type Boundaries = Memo<(Same<Cuts>, Option<usize>, Params, f64), Boundary>;
 
 /// What a liquid is drawn from.
 #[derive(Clone, Copy)]
@@ -168,7 +168,9 @@ impl Liquid<'_> {
         let input = Input { particles: self.matter.particles, radius_scale: ball as f32 };
         let extract = || Ok(Boundary::extract(&input, params, self.level));
         let boundary: std::result::Result<_, Infallible> = match (self.boundaries, self.matter.identity) {
-            (Some(kept), Some(of)) => kept.get((Same(of.clone()), *params, ball), extract),
+            (Some(kept), Some((of, kind))) => {
+                kept.get((Same(of.clone()), kind, *params, ball), extract)
+            }
             _ => extract().map(Arc::new),
         };
         let Ok(boundary) = boundary;

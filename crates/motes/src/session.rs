@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 use motes_frame::{Background, Curve, Frame, Tone};
-use motes_grid::Visibility;
 use motes_particles::read::{Wanted, names};
-use motes_particles::{Particles, Series, SimulationBox};
+use motes_particles::{Series, SimulationBox};
 use motes_scene::{
-    Bounds, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show,
+    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene,
+    Section, Show,
 };
 
+use crate::ahead::{Ahead, All};
 use crate::annotate::{Annotated, annotations};
 use crate::drawing::{Drawing, Kept};
 use crate::memo::Same;
@@ -20,7 +21,7 @@ use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::system::Loaded;
+use crate::system::{Cuts, Loaded};
 use crate::{Error, Result};
 
 /// Whether a picture carries depth, normal, id and system besides colour.
@@ -99,6 +100,8 @@ enum After {
     /// It may be asked for again.
     Kept,
     LetGo,
+    /// It is one of many that pass by: as Kept, but what a liquid hides of lines is not found out.
+    Moves,
 }
 
 /// A scene whose sources are open.
@@ -106,6 +109,9 @@ pub struct Session {
     scene: Scene,
     series: Vec<Arc<Mutex<Series>>>,
     pool: Option<rayon::ThreadPool>,
+    /// The frame that was read last.
+    last: Option<(Reading, All)>,
+    ahead: Ahead<Reading>,
     /// What was made of each system's last frame.
     stages: Vec<Stages>,
     /// Boxes around what is to be framed, and what they are around.
@@ -143,6 +149,8 @@ impl Session {
         Self {
             scene,
             pool: None,
+            last: None,
+            ahead: Ahead::default(),
             stages: series.iter().map(|_| Stages::default()).collect(),
             framed: None,
             kept: Kept::default(),
@@ -275,16 +283,19 @@ impl Session {
             shown,
             stats,
             scene: drawn.scene.to_toml(),
+            view: drawn.resolved.view,
             transparent: self.scene.image.transparent,
         })
     }
 
-    /// A picture as it is shown, and what it is of. The hash is made only if it is asked for.
+    /// A picture as it is shown, and what it is of; of a passing one without its hash, and with lines before
+    /// what a liquid would hide of them.
     ///
     /// # Errors
     /// As [`Session::render`].
     pub(crate) fn look(&mut self, frame: usize, hashed: bool, watch: &dyn Watch) -> Result<Look> {
-        let drawn = self.draw((frame.into(), After::Kept), Layers::No, watch)?;
+        let after = if hashed { After::Kept } else { After::Moves };
+        let drawn = self.draw((frame.into(), after), Layers::No, watch)?;
         let Drawn { raw, mut stats, loaded, resolved, boxes, origin, .. } = drawn;
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
@@ -330,7 +341,9 @@ impl Session {
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth.
-        let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
+        let lines = loaded.iter().any(|l| l.sim_box.is_some());
+        let quick = after == After::Moves && self.scene.renderer != Renderer::Spheres;
+        let layers = layers == Layers::Yes || (lines && !quick);
         let start = Instant::now();
         let drawing = Drawing {
             scene: &self.scene,
@@ -416,7 +429,7 @@ impl Session {
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
-    fn load(&mut self, particles: Vec<Option<Arc<Particles>>>) -> Result<(Vec<Loaded>, DVec3)> {
+    fn load(&mut self, particles: All) -> Result<(Vec<Loaded>, DVec3)> {
         let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
         let mut loaded = Vec::new();
         for (i, particles) in particles.into_iter().enumerate() {
@@ -445,50 +458,74 @@ impl Session {
     }
 
     /// Reads the frame of every visible system; `None` for hidden ones.
-    fn read(
-        &mut self,
-        frame: usize,
-        after: After,
-        watch: &dyn Watch,
-    ) -> Result<Vec<Option<Arc<Particles>>>> {
-        let report = |done, total| _ = watch.progress("read", done, total);
-        let mut all = Vec::new();
-        for i in 0..self.series.len() {
-            let system = &self.scene.system[i];
-            if !system.visible {
-                all.push(None);
-                continue;
-            }
-            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(system.frame_offset);
-            let own = usize::try_from(own).map_err(|_| {
-                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
-            })?;
-            // Beside a series, what has one frame stands still.
-            let mut series = lock(&self.series[i]);
-            let still = own > 0 && self.series.len() > 1 && series.frames(&report)? == 1;
-            let own = if still { 0 } else { own };
-            let mut wanted = wanted(system);
-            let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
-            if masked && let Wanted::Only(columns) = &mut wanted {
-                columns.push(names::PARTICLE_MASK.into());
-            }
-            if self.all_columns {
-                wanted = Wanted::All;
-            }
-            let key = RangeKey::of(system);
-            if self.ranges[i].as_ref().map(|(had, _)| had) != key.as_ref() {
-                self.ranges[i] = None;
-            }
-            if let Some(key) = key.filter(|_| self.ranges[i].is_none()) {
-                let range = series_range(&mut series, system, &wanted, watch)?;
-                self.ranges[i] = Some((key, range));
-            }
-            all.push(Some(match after {
-                After::Kept => series.frame(own, &wanted, &report)?,
-                After::LetGo => Arc::new(series.take(own, &wanted, &report)?),
-            }));
+    fn read(&mut self, frame: usize, after: After, watch: &dyn Watch) -> Result<All> {
+        let key = self.reading(frame);
+        self.find_ranges(&key, watch)?;
+        if let Some((_, all)) = self.last.as_ref().filter(|(had, _)| *had == key) {
+            return Ok(all.clone());
+        }
+        // No two frames need be in memory, but for the memory of grids.
+        self.last = None;
+        self.stages.iter_mut().for_each(Stages::forget);
+        let all = match self.ahead.take(&key) {
+            Some(all) => all,
+            None => key.read(&self.series, after, watch)?,
+        };
+        if after != After::LetGo {
+            self.last = Some((key, all.clone()));
         }
         Ok(all)
+    }
+
+    /// Begins to read a frame, while others are drawn.
+    pub(crate) fn read_ahead(&self, frame: usize) {
+        let (key, series) = (self.reading(frame), self.series.clone());
+        let own = key.clone();
+        self.ahead.begin(key, move || own.read(&series, After::Kept, &Quiet).ok());
+    }
+
+    /// The frame that has been read so.
+    pub(crate) fn is_ahead(&self) -> Option<usize> {
+        self.ahead.ready().map(|key| key.frame)
+    }
+
+    /// What is to be read for a frame.
+    fn reading(&self, frame: usize) -> Reading {
+        let of = |(i, system): (usize, &motes_scene::System)| {
+            system.visible.then(|| (system.frame_offset, self.wanted(i, system)))
+        };
+        Reading { frame, systems: self.scene.system.iter().enumerate().map(of).collect() }
+    }
+
+    /// The columns that a system needs.
+    fn wanted(&self, i: usize, system: &motes_scene::System) -> Wanted {
+        let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
+        if self.all_columns || self.scene.sections_of(i).any(|(_, s)| by_property(s)) {
+            return Wanted::All;
+        }
+        let mut wanted = wanted(system);
+        let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
+        if masked && let Wanted::Only(columns) = &mut wanted {
+            columns.push(names::PARTICLE_MASK.into());
+        }
+        wanted
+    }
+
+    /// Finds the ranges of colours over whole series, where they are asked for.
+    fn find_ranges(&mut self, key: &Reading, watch: &dyn Watch) -> Result<()> {
+        for (i, system) in self.scene.system.iter().enumerate() {
+            let Some((_, wanted)) = &key.systems[i] else { continue };
+            let of = RangeKey::of(system);
+            if self.ranges[i].as_ref().map(|(had, _)| had) == of.as_ref() {
+                continue;
+            }
+            self.ranges[i] = None;
+            if let Some(of) = of {
+                let range = series_range(&mut lock(&self.series[i]), system, wanted, watch)?;
+                self.ranges[i] = Some((of, range));
+            }
+        }
+        Ok(())
     }
 
     /// Tone, background and annotations.
@@ -558,13 +595,47 @@ pub(crate) struct Seen {
     pub origin: DVec3,
 }
 
+/// What is read for a frame: of each visible system its offset, and which columns.
+#[derive(Clone, PartialEq)]
+struct Reading {
+    frame: usize,
+    systems: Vec<Option<(i64, Wanted)>>,
+}
+
+impl Reading {
+    fn read(
+        &self,
+        all: &[Arc<Mutex<Series>>],
+        after: After,
+        watch: &dyn Watch,
+    ) -> Result<All> {
+        let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
+        let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
+            let Some((offset, wanted)) = system else { return Ok(None) };
+            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(*offset);
+            let own = usize::try_from(own).map_err(|_| {
+                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
+            })?;
+            // Beside a series, what has one frame stands still.
+            let mut series = lock(series);
+            let still = own > 0 && all.len() > 1 && series.frames(&report)? == 1;
+            let own = if still { 0 } else { own };
+            Ok(Some(match after {
+                After::Kept | After::Moves => series.frame(own, wanted, &report)?,
+                After::LetGo => Arc::new(series.take(own, wanted, &report)?),
+            }))
+        };
+        all.iter().zip(&self.systems).map(of).collect()
+    }
+}
+
 /// What boxes are made around.
 #[derive(PartialEq)]
-struct Framed(Same<Vec<Visibility>>, Option<SimulationBox>, DVec3);
+struct Framed(Same<Cuts>, Option<SimulationBox>, DVec3);
 
 impl Framed {
     fn of(loaded: &Loaded, origin: DVec3) -> Self {
-        Self(Same(loaded.visible.clone()), loaded.sim_box, origin)
+        Self(Same(loaded.cuts.clone()), loaded.sim_box, origin)
     }
 }
 
@@ -649,5 +720,5 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
-    stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));
+    stats.bytes.insert("visibility", sum(&Loaded::visibility_bytes));
 }

@@ -1,20 +1,22 @@
 //! From a frame's particles to what can be drawn of a system, stage by stage. Each is redone only when
 //! what it depends on has changed:
 //!
-//! > particles ──radii──► grids ──where, filters──► visible
+//! > particles ──radii──► grids ──where, filters──► visible ──sections──► cuts
 //! > particles ──color, opacity──► paint
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{Params, RadiusClasses, Resolution, Visibility};
+use motes_grid::{Params, RadiusClasses, Resolution};
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Coloring, Scene, Show, System};
+use motes_scene::{Coloring, Scene, Section, Show, System};
 
 use crate::annotate::box_shown;
+use crate::caps::Caps;
+use crate::memo::Same;
 use crate::paint::Paint;
-use crate::system::{Loaded, asks_for_positions, visibility};
+use crate::system::{Cuts, Loaded, asks_for_positions, diagonal, is_liquid};
 use crate::{Result, radius};
 
 /// The stages of one system.
@@ -27,7 +29,8 @@ pub(crate) struct Stages {
     /// Whether the grids no longer know which of their particles coincide.
     forgotten: bool,
     paint: Option<(PaintKey, Arc<Paint>)>,
-    visible: Option<(VisibleKey, Arc<Vec<Visibility>>)>,
+    cuts: Option<(VisibleKey, CutKey, Arc<Cuts>)>,
+    caps: Option<(Same<Cuts>, Vec<Section>, Arc<Caps>)>,
 }
 
 /// What grids depend on besides particles.
@@ -61,6 +64,14 @@ impl VisibleKey {
     }
 }
 
+/// What cuts depend on besides what is visible.
+#[derive(Clone, PartialEq)]
+struct CutKey {
+    sections: Vec<Section>,
+    origin: DVec3,
+    liquid: bool,
+}
+
 impl Stages {
     /// What is to be drawn of `particles` about the scene's `origin`. Of particles that nobody else holds
     /// the positions are let go once the grids hold them. Grids are built in the memory of those before.
@@ -83,19 +94,28 @@ impl Stages {
             block: scene.spheres.block,
             shift: DVec3::from_array(particles.origin) - origin,
         };
-        self.build(&key, spare, (&mut particles, system));
+        self.build(&key, spare, (&mut particles, (scene, system)));
         self.particles = Some(particles.clone());
         let paint = self.painted(&particles, PaintKey {
             color: system.color.clone(),
             opacity: system.opacity,
             range,
         }, system)?;
-        self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, system));
+        self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, (scene, system)));
         let Some((_, classes)) = &self.grids else { return Err(crate::Error::Cancelled) };
         let classes = classes.clone();
-        let visible = self.seen(&particles, &classes, system)?;
+        let number = usize::from(number);
+        let cuts = self.cut((&particles, &classes), (scene, number), origin)?;
+        let caps = self.capped((&particles, &classes), &cuts, (scene, number))?;
         let sim_box = self.boxed(&particles, scene.overlay.r#box);
-        Ok(Loaded { number, particles, sim_box, classes, visible, paint })
+        let number = number as u16;
+        Ok(Loaded { number, particles, sim_box, classes, cuts, paint, caps })
+    }
+
+    /// Forgets all but the memory of the grids: other particles come.
+    pub fn forget(&mut self) {
+        let grids = self.grids.take();
+        *self = Self { grids, ..Self::default() };
     }
 
     /// Forgets what was made of other particles; gives the memory of their grids.
@@ -112,7 +132,7 @@ impl Stages {
         &mut self,
         key: &GridKey,
         mut memory: RadiusClasses,
-        (particles, system): (&mut Arc<Particles>, &System),
+        (particles, (scene, system)): (&mut Arc<Particles>, (&Scene, &System)),
     ) {
         if self.grids.as_ref().is_some_and(|(had, _)| had == key) {
             return;
@@ -126,7 +146,7 @@ impl Stages {
             resolution: Resolution::CellsPerParticle(key.lambda as f32),
             block_cells: key.block,
         };
-        let keeps = asks_for_positions(particles, system);
+        let keeps = asks_for_positions(particles, (scene, system));
         let own = Arc::get_mut(particles).filter(|_| !keeps);
         let mut positions = match own.map(Particles::take_positions) {
             Some(positions) => positions.into(),
@@ -140,7 +160,7 @@ impl Stages {
         }
         let classes = radius::classes(memory, positions, rule, key.scale as f32, params);
         self.grids = Some((key.clone(), Arc::new(classes)));
-        (self.forgotten, self.visible) = (false, None);
+        (self.forgotten, self.cuts) = (false, None);
     }
 
     fn painted(
@@ -164,7 +184,7 @@ impl Stages {
         &mut self,
         forget: bool,
         key: &GridKey,
-        of: (&mut Arc<Particles>, &System),
+        of: (&mut Arc<Particles>, (&Scene, &System)),
     ) {
         let some = self.grids.iter().any(|(_, c)| c.grids.iter().any(|g| !g.crowded.is_empty()));
         if (forget && !some) || (!forget && !self.forgotten) {
@@ -179,23 +199,51 @@ impl Stages {
         }
         if let Some(classes) = self.grids.as_mut().and_then(|(_, c)| Arc::get_mut(c)).filter(|_| forget) {
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
-            (self.forgotten, self.visible) = (true, None);
+            (self.forgotten, self.cuts) = (true, None);
         }
     }
 
-    fn seen(
+    /// Cuts that move change what they must of those before.
+    fn cut(
         &mut self,
-        particles: &Particles,
-        classes: &RadiusClasses,
-        system: &System,
-    ) -> Result<Arc<Vec<Visibility>>> {
-        let key = VisibleKey::of(system);
-        match &self.visible {
-            Some((had, visible)) if *had == key => Ok(visible.clone()),
+        (particles, classes): (&Particles, &RadiusClasses),
+        (scene, number): (&Scene, usize),
+        origin: DVec3,
+    ) -> Result<Arc<Cuts>> {
+        let visible = VisibleKey::of(&scene.system[number]);
+        let liquid = is_liquid(scene, number);
+        let key = CutKey { sections: scene.section.clone(), origin, liquid };
+        let mut cuts = match self.cuts.take() {
+            Some((had, had_key, cuts)) if had == visible => {
+                if had_key == key {
+                    self.cuts = Some((visible, key, cuts.clone()));
+                    return Ok(cuts);
+                }
+                cuts
+            }
+            _ => Arc::default(),
+        };
+        Arc::make_mut(&mut cuts).set((particles, classes), (scene, number), origin)?;
+        self.cuts = Some((visible, key, cuts.clone()));
+        Ok(cuts)
+    }
+
+    fn capped(
+        &mut self,
+        (particles, classes): (&Arc<Particles>, &RadiusClasses),
+        cuts: &Arc<Cuts>,
+        (scene, number): (&Scene, usize),
+    ) -> Result<Arc<Caps>> {
+        let same = Same(cuts.clone());
+        match &self.caps {
+            Some((of, sections, caps)) if *of == same && *sections == scene.section => {
+                Ok(caps.clone())
+            }
             _ => {
-                let visible = Arc::new(visibility(particles, classes, system)?);
-                self.visible = Some((key, visible.clone()));
-                Ok(visible)
+                let diagonal = diagonal(classes, cuts.visible());
+                let caps = Arc::new(Caps::new((scene, number), particles, diagonal)?);
+                self.caps = Some((same, scene.section.clone(), caps.clone()));
+                Ok(caps)
             }
         }
     }
@@ -240,7 +288,7 @@ mod tests {
     fn shared(a: &Loaded, b: &Loaded) -> [bool; 3] {
         [
             Arc::ptr_eq(&a.classes, &b.classes),
-            Arc::ptr_eq(&a.visible, &b.visible),
+            Arc::ptr_eq(&a.cuts, &b.cuts),
             Arc::ptr_eq(&a.paint, &b.paint),
         ]
     }
@@ -251,7 +299,9 @@ mod tests {
         let first = load(&mut of, &[]);
         for (assignments, expected) in [
             (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
-            (&["overlay.box=on", "renderer=surface"], [true, true, true]),
+            (&["overlay.box=on"], [true, true, true]),
+            (&["renderer=surface"], [true, false, true]),
+            (&["section=[{}]"], [true, false, true]),
             (&["system.where=Index < 100"], [true, false, true]),
             (&["system.filter=[{ min = 0.5 }]"], [true, false, true]),
             (&["system.color.by=Position"], [true, true, false]),
@@ -280,7 +330,7 @@ mod tests {
             let grid = &loaded.classes.grids[0];
             let blocks = 0..grid.blocks.len() - 1;
             let of_block = |block| {
-                let seen = loaded.visible[0].block(grid, block);
+                let seen = loaded.visible()[0].block(grid, block);
                 grid.particles_of(block).enumerate().filter(|(i, _)| seen.shows(*i)).count()
             };
             blocks.map(of_block).sum::<usize>()

@@ -274,6 +274,25 @@ fn what_is_picked_is_what_the_layers_have() {
 }
 
 #[test]
+fn a_line_drawn_on_the_picture_is_a_plane_that_cuts_and_is_taken_back() {
+    let client = Client::new("demo:packed:3000", &[]);
+    let whole = client.settle();
+    let plane = client.ask("drag", json!({"from": [0.4, 0.5], "to": [0.6, 0.5]})).unwrap();
+    let section = json!({"point": plane["point"], "normal": plane["normal"], "cut": "caps"});
+    client.set(json!({"section": [section]})).unwrap();
+    let cut = client.settle();
+    assert!(cut.hash != whole.hash);
+    assert_eq!(format!("{:016x}", cut.hash), rendered(client.scene()));
+    let visible = client.last("stats")["particles"]["visible"].as_u64().unwrap();
+    assert!((500..2900).contains(&visible), "{visible}");
+    client.ask("undo", json!({})).unwrap();
+    assert_eq!(client.settle().hash, whole.hash);
+    for (from, to) in [([0.5, 0.5], [0.5, 0.5]), ([0.0, 0.0], [0.01, 0.0]), ([2.0, 0.5], [0.5, 0.5])] {
+        assert!(client.ask("drag", json!({"from": from, "to": to})).is_err(), "{from:?} {to:?}");
+    }
+}
+
+#[test]
 fn particles_are_selected_counted_and_binned() {
     let client = Client::new("demo:random:2000", &[]);
     client.settle();

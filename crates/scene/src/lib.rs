@@ -25,6 +25,7 @@ mod color;
 mod color_points;
 mod colormap;
 pub mod density;
+mod drag;
 mod elements;
 mod environment;
 mod error;
@@ -34,6 +35,7 @@ mod motion;
 pub mod optics;
 mod resolve;
 mod scene;
+mod section;
 mod set;
 mod settings;
 pub mod surface;
@@ -55,4 +57,5 @@ pub use scene::{
     Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Renderer, Scene, Show, Solver,
     Sph, Spheres, System, Tone,
 };
+pub use section::{CapColor, Cut, Names, Section};
 pub use settings::{Field, Setting, Shape};

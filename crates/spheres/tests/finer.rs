@@ -68,8 +68,8 @@ fn picture(
     let radii: Vec<f32> = spheres.iter().map(|s| s.1).collect();
     let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let systems = [Spheres { classes: &classes, visible: &visible }];
-    let view = View { rays, systems: &systems, paint: &Gray(gray), lights };
+    let systems = [Spheres::new(&classes, &visible)];
+    let view = View { rays, systems: &systems, paint: &Gray(gray), lights, casters: &[] };
     render(view, settings, &|_, _| true).unwrap()
 }
 

@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use fearless_simd::{Level, dispatch};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use motes_grid::{Grid, Visibility};
 use motes_particles::read::names;
 use motes_particles::{Particles, Values, select};
-use motes_scene::{CameraView, Component, Element, Renderer, Scene};
-use motes_spheres::{Counts, Packet, Spheres};
+use motes_scene::{CameraView, Component, Element, Light, Renderer, Scene};
+use motes_spheres::{Counts, Packet};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use crate::entries::Entries;
 use crate::paint::{Paint, find_property};
 use crate::session::Seen;
 use crate::system::Loaded;
@@ -36,19 +37,44 @@ struct Found<'a> {
 /// shows; of a liquid what stands in it, else the ball that the eye meets first.
 pub(super) fn pick(scene: &Scene, seen: &Seen, at: [f64; 2]) -> Result<Value> {
     let view = view_of(scene, seen)?;
-    let [x, y] = [(at[0], view.width), (at[1], view.height)].map(|(part, pixels)| {
-        let pixel = (part * f64::from(pixels)).floor().clamp(0.0, f64::from(pixels) - 1.0);
-        pixel as f32 + 0.5
+    let place = [(at[0], view.width), (at[1], view.height)].map(|(part, pixels)| {
+        let last = f64::from(pixels) - 1.0;
+        (part * f64::from(pixels)).floor().clamp(0.0, last) + 0.5
     });
-    let ray = view.rays(seen.origin).ray(x, y);
-    let liquid = scene.renderer != Renderer::Spheres;
-    let found = match (&seen.loaded[..], liquid) {
-        (all, false) => sphere_at(all, ray, seen.origin),
-        ([], true) => None,
-        ([liquid, others @ ..], true) => sphere_at(others, ray, seen.origin)
-            .or_else(|| ball_at(liquid, ray, (scene.surface.ball as f32, seen.origin))),
-    };
+    let found = met(scene, seen, (&view, place));
     Ok(json!({"picked": found.map(|found| describe(scene, &found))}))
+}
+
+/// What the ray through a place of the picture (pixels) meets.
+fn met<'a>(
+    scene: &Scene,
+    seen: &'a Seen,
+    (view, place): (&CameraView, [f64; 2]),
+) -> Option<Found<'a>> {
+    let ray = view.rays(seen.origin).ray(place[0] as f32, place[1] as f32);
+    let about = (&scene.light, seen.origin);
+    match (&seen.loaded[..], scene.renderer) {
+        (all, Renderer::Spheres) => sphere_at(all, ray, about),
+        ([], _) => None,
+        ([liquid, others @ ..], _) => sphere_at(others, ray, about)
+            .or_else(|| ball_at(liquid, ray, (scene.surface.ball as f32, seen.origin))),
+    }
+}
+
+/// The cutting plane of a line that is drawn on the picture, 0 to 1 from the left and from the top.
+///
+/// # Errors
+/// The line has no length, or leads over nothing that is seen.
+pub(super) fn drag(scene: &Scene, seen: &Seen, ends: [[f64; 2]; 2]) -> Result<Value> {
+    let view = view_of(scene, seen)?;
+    let size = DVec2::new(f64::from(view.width), f64::from(view.height));
+    let [from, to] = ends.map(|at| DVec2::from_array(at) * size);
+    let depth = |x: u32, y: u32| {
+        let place = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+        Some(f64::from(met(scene, seen, (&view, place))?.depth))
+    };
+    let section = view.section_of_drag((from, to), &depth)?;
+    Ok(json!({"point": section.point, "normal": section.normal}))
 }
 
 /// The camera of the whole canvas, before what was seen.
@@ -62,16 +88,16 @@ fn view_of(scene: &Scene, seen: &Seen) -> Result<CameraView> {
 fn sphere_at<'a>(
     loaded: &'a [Loaded],
     (origin, direction): (Vec3, Vec3),
-    about: DVec3,
+    (light, about): (&Light, DVec3),
 ) -> Option<Found<'a>> {
-    let systems: Vec<Spheres<'_>> = loaded.iter().map(Loaded::spheres).collect();
+    let entries = Entries::new(loaded, light);
     let mut packet = Packet::new();
     packet.push(origin, direction);
     dispatch!(Level::new(), simd =>
-        motes_spheres::trace(simd, &mut packet, &systems, &mut Counts::default()));
-    let (depth, system, slot) = packet.hit(0)?;
-    let (grid, place) = systems.get(usize::from(system))?.locate(slot);
-    Some(found(loaded.get(usize::from(system))?, (grid, place), (depth, about)))
+        motes_spheres::trace(simd, &mut packet, &entries.spheres, &mut Counts::default()));
+    let (depth, entry, slot) = packet.hit(0)?;
+    let (grid, place) = entries.spheres.get(usize::from(entry))?.locate(slot);
+    Some(found(entries.system(entry), (grid, place), (depth, about)))
 }
 
 fn found<'a>(
