@@ -24,6 +24,10 @@ use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
 
+/// Up to so many particles, balls are fitted to the surface by themselves: of more, each is but a few pixels wide.
+const FIT_AUTO: usize = 500_000;
+/// The least edge of cells to fit by, in radii of the balls.
+const FIT_CELL: f64 = 1.8;
 /// Rows of the light's own view.
 const SHADOW_ROWS: u32 = 1024;
 
@@ -240,6 +244,11 @@ impl Liquid<'_> {
     /// How spans are made; with `ids`, surfaces know their particles.
     pub fn params(&self, ids: bool) -> Params {
         let s = &self.scene.surface;
+        let fit = match s.fit {
+            surface::Fit::Auto => self.matter.visible <= FIT_AUTO,
+            surface::Fit::On => true,
+            surface::Fit::Off => false,
+        };
         Params {
             gap: s.gap.unwrap_or(5.0 * self.radius()) as f32,
             spans: s.spans,
@@ -248,7 +257,9 @@ impl Liquid<'_> {
                 Culling::Count => Cull::Count(s.cull_count),
                 Culling::Off => Cull::Off,
             },
-            cell: s.cull_cell as f32,
+            // What is fitted to the surface looks at all neighbours within a cell.
+            cell: s.cull_cell.max(if fit { FIT_CELL } else { 0.0 }) as f32,
+            fit,
             spray: match s.spray {
                 surface::Spray::Keep if s.drop == s.ball => Spray::Liquid,
                 surface::Spray::Keep => Spray::Drops((s.drop / s.ball) as f32),

@@ -13,7 +13,7 @@ use motes_spheres::Spheres;
 
 use crate::annotate::box_shown;
 use crate::paint::{Paint, category_column, find_property, kinds_of};
-use crate::radius::Rule;
+use crate::radius::{Rule, Spacing};
 use crate::{Error, Result, radius};
 
 /// A system ready to be drawn.
@@ -41,7 +41,7 @@ impl Loaded {
         (number, origin): (u16, DVec3),
         range: Option<[f64; 2]>,
     ) -> Result<Self> {
-        let rule = radius::rule(&particles, system);
+        let rule = radius::rule(&particles, system, Spacing::of(scene, number as usize));
         let params = Params {
             resolution: Resolution::CellsPerParticle(scene.spheres.lambda as f32),
             block_cells: scene.spheres.block,
@@ -73,8 +73,10 @@ impl Loaded {
 
     /// Where radii were measured in this frame, makes them the scene's for all frames.
     pub fn hold_radius(&self, scene: &mut Scene) {
+        let spacing = Spacing::of(scene, self.number as usize);
         let Some(system) = scene.system.get_mut(self.number as usize) else { return };
-        let measured = matches!(radius::rule(&self.particles, system), Rule::HalfSpacing);
+        let rule = radius::rule(&self.particles, system, spacing);
+        let measured = matches!(rule, Rule::HalfSpacing(_));
         if let Some(grid) = self.classes.grids.first().filter(|_| measured) {
             system.radius = Some(f64::from(grid.radius_at(0)) / system.radius_scale);
         }

@@ -49,7 +49,7 @@ settings! {
         frame_offset: i64 = 0,
         /// Whether it is drawn.
         visible: bool = true,
-        /// One radius for all particles, in the file's unit of length; none: the file's, else the element's, else half the nearest distance.
+        /// One radius for all particles, in the file's unit of length; none: the file's, else the element's, else half the nearest distance (of a liquid: half the edge of the cube that each has for itself).
         radius: Option<f64> = None => "0.5",
         /// Factor on every radius, wherever it comes from.
         radius_scale: f64 = 1.0,

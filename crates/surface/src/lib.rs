@@ -21,6 +21,7 @@ mod compress;
 pub mod connect;
 mod cull;
 pub mod filter;
+mod fit;
 pub mod flow;
 mod intervals;
 mod items;

@@ -12,9 +12,10 @@ use serde::Serialize;
 
 use super::shot::{Shot, Studio};
 use super::{chosen, median, pool, timed};
+use crate::radius::{self, Spacing};
 use crate::session::{instruction_set, wanted};
 use crate::system::{Loaded, visibility};
-use crate::{Error, Result, Watch, peak_memory_bytes, radius};
+use crate::{Error, Result, Watch, peak_memory_bytes};
 
 /// The stages: construction, warm; cold construction and the first frame; frames of a turning camera with
 /// one ray per pixel sample, with 16 shadow rays more, with 16 occlusion rays more.
@@ -207,7 +208,7 @@ impl Bench {
             resolution: motes_grid::Resolution::CellsPerParticle(self.scene.spheres.lambda as f32),
             block_cells: self.scene.spheres.block,
         };
-        let rule = radius::rule(particles, system);
+        let rule = radius::rule(particles, system, Spacing::of(&self.scene, 0));
         let scale = system.radius_scale as f32;
         let (ms, built) = timed(|| {
             let classes = {
