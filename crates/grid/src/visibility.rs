@@ -75,10 +75,25 @@ const HIDDEN: u32 = u32::MAX;
 const SHOWN: u32 = u32::MAX - 1;
 
 /// A block's state before the words are laid out.
-enum State {
+pub(crate) enum State {
     Hidden,
     Shown(usize),
     Mixed { words: Vec<u64>, visible: usize },
+}
+
+impl State {
+    /// The state of a block of `particles` particles of which `seen` is seen.
+    pub fn of(seen: Seen<'_>, particles: usize) -> Self {
+        match seen {
+            Seen::Hidden => Self::Hidden,
+            Seen::Shown => Self::Shown(particles),
+            Seen::Mixed(words) => match words.iter().map(|w| w.count_ones() as usize).sum() {
+                0 => Self::Hidden,
+                n if n == particles => Self::Shown(n),
+                visible => Self::Mixed { words: words.to_vec(), visible },
+            },
+        }
+    }
 }
 
 impl Visibility {
@@ -156,7 +171,40 @@ impl Visibility {
         all
     }
 
-    /// How many particles pass the filters, coinciding ones included.
+    /// The same, with a place for words for every block, which [`Visibility::put`] asks for.
+    pub(crate) fn with_room(&self, grid: &Grid) -> Self {
+        let blocks = self.states.len();
+        let words = room(grid, blocks);
+        let mut all = Self { states: vec![HIDDEN; blocks], words: vec![0; words], visible: 0 };
+        for block in 0..blocks {
+            let state = State::of(self.block(grid, block), grid.particles_of(block).len());
+            all.put(grid, block, &state);
+        }
+        all
+    }
+
+    /// Changes what is seen of a block.
+    pub(crate) fn put(&mut self, grid: &Grid, block: usize, state: &State) {
+        let particles = grid.particles_of(block).len();
+        let count = |seen: Seen<'_>| match seen {
+            Seen::Hidden => 0,
+            Seen::Shown => particles,
+            Seen::Mixed(words) => words.iter().map(|w| w.count_ones() as usize).sum(),
+        };
+        self.visible -= count(self.block(grid, block));
+        self.states[block] = match state {
+            State::Hidden => HIDDEN,
+            State::Shown(_) => SHOWN,
+            State::Mixed { words, .. } => {
+                let start = room(grid, block);
+                self.words[start..start + words.len()].copy_from_slice(words);
+                start as u32
+            }
+        };
+        self.visible += count(self.block(grid, block));
+    }
+
+    /// How many particles pass the filters, coinciding ones included; where there are cuts, one of these counts.
     pub fn visible(&self) -> usize {
         self.visible
     }
@@ -165,6 +213,12 @@ impl Visibility {
     pub fn bytes(&self) -> usize {
         self.states.len() * 4 + self.words.len() * 8
     }
+}
+
+/// Where the words of a block begin if every block has a place for them: no two places overlap, as each
+/// block has up to one word more than its whole 64s.
+fn room(grid: &Grid, block: usize) -> usize {
+    grid.blocks[block].first as usize / 64 + block
 }
 
 fn state_of(

@@ -34,6 +34,7 @@ mod motion;
 pub mod optics;
 mod resolve;
 mod scene;
+mod section;
 mod set;
 mod settings;
 pub mod surface;
@@ -55,4 +56,5 @@ pub use scene::{
     Palette, Preset, Primary, Projection, RangeOver, RelativeTo, Renderer, Scene, Show, Solver,
     Sph, Spheres, System, Tone,
 };
+pub use section::{CapColor, Cut, Names, Section};
 pub use settings::{Field, Setting, Shape};

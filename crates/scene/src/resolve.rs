@@ -74,6 +74,7 @@ impl Scene {
         crate::surface::check(&self.surface)?;
         crate::density::check(&self.density)?;
         self.sph.check()?;
+        crate::section::check(self)?;
         check_overlay(&self.overlay)
     }
 }
@@ -93,7 +94,7 @@ pub(crate) fn need<T: std::fmt::Debug>(
     Err(SceneError::value(path, expected, inner.unwrap_or(&found).to_owned()))
 }
 
-fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
+pub(crate) fn need_vector(path: &str, v: Option<DVec3>) -> Result<()> {
     let fits = v.is_none_or(|v| v.is_finite() && v.normalize_or_zero() != DVec3::ZERO);
     need(path, v.map(|v| v.to_array()), fits, "a finite vector with a length")
 }

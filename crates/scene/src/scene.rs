@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::color::Color;
 use crate::density::Density;
+use crate::section::Section;
 use crate::settings::{Setting, Shape, settings, words};
 use crate::surface::Surface;
 
@@ -33,6 +34,8 @@ settings! {
         density: Density = Density::default(),
         /// The simulation of liquids, for sim: sources.
         sph: Sph = Sph::default(),
+        /// Planes that cut what is seen open.
+        section: Vec<Section> = Vec::new(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
     }
@@ -231,6 +234,8 @@ settings! {
         occlusion_radius: Option<f64> = None => "1.0",
         /// Directions in which light from other surfaces is looked for (one diffuse bounce), for each sample of a pixel; 0: none.
         bounce_rays: u32 = 0,
+        /// Whether particles still keep light away where sections have cut them: light as before the cut.
+        uncut: bool = false,
         /// Light from everywhere alike, which no shape shows.
         ambient: f64 = 0.0,
     }
