@@ -1,4 +1,4 @@
-//! Sections: what cuts leave of one grid, kept up to date as cuts come, move and go.
+//! Sections: what cuts leave of grids, kept up to date as cuts come, move and go.
 //!
 //! Chaudhari, §3.1–3.4: each block counts the cuts that have taken it ([`crate::Width`]); a cut raises
 //! the counters of its blocks, its undoing lowers them, in any order. Here a cut is a [`Clause`], and there
@@ -15,16 +15,16 @@ use crate::counters::Counters;
 use crate::visibility::State;
 use crate::{Clause, Clip, Fate, Grid, Group, Seen, Visibility, Width};
 
-/// What filters and cuts leave of one grid.
+/// What filters and cuts leave of the grids of one system.
 #[derive(Clone, Debug)]
 pub struct Sections {
     clip: Clip,
-    /// What passes the filters.
-    base: Visibility,
-    /// What is left of that; `None` without cuts: all.
-    shown: Option<Visibility>,
+    /// Per grid, what passes the filters.
+    base: Vec<Visibility>,
+    /// What is left of that; empty without cuts: all.
+    shown: Vec<Visibility>,
     /// How many clauses have taken each block.
-    gone: Counters,
+    gone: Vec<Counters>,
 }
 
 /// What one block becomes.
@@ -36,10 +36,10 @@ struct Change {
 }
 
 impl Sections {
-    /// No cuts yet: all that `base` shows of `grid`.
-    pub fn new(grid: &Grid, base: Visibility, width: Width) -> Self {
-        let gone = Counters::new(width, grid.blocks.len() - 1);
-        Self { clip: Clip::default(), base, shown: None, gone }
+    /// No cuts yet: all that `base` shows, one for each of `grids`.
+    pub fn new(grids: &[Grid], base: Vec<Visibility>, width: Width) -> Self {
+        let gone = grids.iter().map(|grid| Counters::new(width, grid.blocks.len() - 1)).collect();
+        Self { clip: Clip::default(), base, shown: Vec::new(), gone }
     }
 
     /// The cuts.
@@ -47,49 +47,53 @@ impl Sections {
         &self.clip
     }
 
-    /// What is seen.
-    pub fn visible(&self) -> &Visibility {
-        self.shown.as_ref().unwrap_or(&self.base)
+    /// What is seen, grid by grid.
+    pub fn visible(&self) -> &[Visibility] {
+        if self.shown.is_empty() { &self.base } else { &self.shown }
     }
 
     /// What would be seen without cuts.
-    pub fn uncut(&self) -> &Visibility {
+    pub fn uncut(&self) -> &[Visibility] {
         &self.base
     }
 
     /// Bytes it holds.
     pub fn bytes(&self) -> usize {
-        self.base.bytes() + self.shown.as_ref().map_or(0, Visibility::bytes) + self.gone.bytes()
+        let visible = self.base.iter().chain(&self.shown).map(Visibility::bytes).sum::<usize>();
+        visible + self.gone.iter().map(Counters::bytes).sum::<usize>()
     }
 
-    /// Goes over to the cuts of `clip`: adds, moves, takes back any of them. `grid` is the grid that this was
+    /// Goes over to the cuts of `clip`: adds, moves, takes back any of them. `grids` are those that this was
     /// made for. Gives how many blocks were worked on.
-    pub fn set(&mut self, grid: &Grid, clip: Clip) -> usize {
+    pub fn set(&mut self, grids: &[Grid], clip: Clip) -> usize {
         let before = std::mem::replace(&mut self.clip, clip);
-        let step = Step {
-            grid,
-            old: missing(&before, &self.clip),
-            new: missing(&self.clip, &before),
-            sections: self,
-        };
-        if step.old.is_empty() && step.new.is_empty() {
+        let (old, new) = (missing(&before, &self.clip), missing(&self.clip, &before));
+        if old.is_empty() && new.is_empty() {
             return 0;
         }
-        let of_group = |group: &Group| step.group(group);
-        let changes: Vec<Change> =
-            grid.groups.par_iter().with_min_len(4).flat_map_iter(of_group).collect();
-        let base = &self.base;
-        let shown = self.shown.get_or_insert_with(|| base.with_room(grid));
-        for change in &changes {
-            self.gone.set(change.block, change.gone);
-            if let Some(state) = &change.state {
-                shown.put(grid, change.block, state);
+        if self.shown.is_empty() {
+            let with_room = grids.iter().zip(&self.base).map(|(grid, base)| base.with_room(grid));
+            self.shown = with_room.collect();
+        }
+        let mut worked = 0;
+        for (i, grid) in grids.iter().enumerate() {
+            let (clip, gone) = (&self.clip, &self.gone[i]);
+            let step = Step { grid, base: &self.base[i], old: &old, new: &new, clip, gone };
+            let of_group = |group: &Group| step.group(group);
+            let changes: Vec<Change> =
+                grid.groups.par_iter().with_min_len(4).flat_map_iter(of_group).collect();
+            for change in &changes {
+                self.gone[i].set(change.block, change.gone);
+                if let Some(state) = &change.state {
+                    self.shown[i].put(grid, change.block, state);
+                }
             }
+            worked += changes.len();
         }
         if self.clip.is_empty() {
-            self.shown = None;
+            self.shown.clear();
         }
-        changes.len()
+        worked
     }
 }
 
@@ -109,10 +113,13 @@ fn missing<'a>(of: &'a Clip, than: &Clip) -> Vec<&'a Clause> {
 /// From one clip to another.
 struct Step<'a> {
     grid: &'a Grid,
+    base: &'a Visibility,
     /// The clauses that go, and those that come.
-    old: Vec<&'a Clause>,
-    new: Vec<&'a Clause>,
-    sections: &'a Sections,
+    old: &'a [&'a Clause],
+    new: &'a [&'a Clause],
+    /// The cuts arrived at.
+    clip: &'a Clip,
+    gone: &'a Counters,
 }
 
 impl Step<'_> {
@@ -131,7 +138,7 @@ impl Step<'_> {
     /// What becomes of a block; `None` where nothing does.
     fn block(&self, index: usize) -> Option<Change> {
         let (mut went, mut mixed) = ([0, 0], false);
-        for (clauses, went) in [&self.old, &self.new].into_iter().zip(&mut went) {
+        for (clauses, went) in [self.old, self.new].into_iter().zip(&mut went) {
             for clause in clauses {
                 match self.fate(clause, index) {
                     Fate::Gone => *went += 1,
@@ -143,9 +150,9 @@ impl Step<'_> {
         if went == [0, 0] && !mixed {
             return None;
         }
-        let gone = self.sections.gone.after(index, went[1], went[0]);
+        let gone = self.gone.after(index, went[1], went[0]);
         let gone = gone.unwrap_or_else(|| self.count(index));
-        let was_gone = self.sections.gone.get(index) > 0;
+        let was_gone = self.gone.get(index) > 0;
         let state = match (was_gone, gone > 0) {
             (true, true) => None,
             (false, true) => Some(State::Hidden),
@@ -162,15 +169,15 @@ impl Step<'_> {
     /// How many clauses take a block, counted anew.
     fn count(&self, index: usize) -> u32 {
         let gone = |clause: &&Clause| self.fate(clause, index) == Fate::Gone;
-        self.sections.clip.clauses.iter().filter(gone).count() as u32
+        self.clip.clauses.iter().filter(gone).count() as u32
     }
 
     /// What is seen of a block that no clause takes whole.
     fn state(&self, index: usize) -> State {
-        let (grid, clip) = (self.grid, &self.sections.clip);
+        let (grid, clip) = (self.grid, self.clip);
         let mixed = |clause: &&Clause| self.fate(clause, index) == Fate::Mixed;
         let mixed: Vec<&Clause> = clip.clauses.iter().filter(mixed).collect();
-        let base = self.sections.base.block(grid, index);
+        let base = self.base.block(grid, index);
         let slots = grid.particles_of(index);
         if mixed.is_empty() {
             return State::of(base, slots.len());

@@ -121,7 +121,7 @@ fn check(sections: &Sections, set: &Set) -> Vec<bool> {
     let mut shown = Vec::new();
     for block in 0..grid.blocks.len() - 1 {
         let (seen, base) =
-            (sections.visible().block(grid, block), sections.uncut().block(grid, block));
+            (sections.visible()[0].block(grid, block), sections.uncut()[0].block(grid, block));
         for (i, slot) in grid.particles_of(block).enumerate() {
             let index = grid.index(slot) as usize;
             let shows = seen.shows(i);
@@ -133,7 +133,7 @@ fn check(sections: &Sections, set: &Set) -> Vec<bool> {
             shown.push(shows);
         }
     }
-    assert_eq!(sections.visible().visible(), shown.iter().filter(|s| **s).count());
+    assert_eq!(sections.visible()[0].visible(), shown.iter().filter(|s| **s).count());
     shown
 }
 
@@ -148,7 +148,8 @@ fn after_any_changes_what_is_seen_is_what_all_clauses_keep() {
             _ => Visibility::where_all(&set.grid, &[], Some(&third)),
         };
         let widths = [Width::One, Width::Four, Width::Eight];
-        let mut all = widths.map(|width| Sections::new(&set.grid, base.clone(), width));
+        let mut all = widths
+            .map(|width| Sections::new(std::slice::from_ref(&set.grid), vec![base.clone()], width));
         // All clips so far with what was seen, and which of them is at hand.
         let mut history = vec![(Clip::default(), check(&all[0], &set))];
         let mut at = 0;
@@ -169,19 +170,19 @@ fn after_any_changes_what_is_seen_is_what_all_clauses_keep() {
                         }
                         _ => clip.clauses.push(clause(random, &set)),
                     }
-                    all[0].set(&set.grid, clip.clone());
+                    all[0].set(std::slice::from_ref(&set.grid), clip.clone());
                     history.truncate(at + 1);
                     history.push((clip, check(&all[0], &set)));
                     at += 1;
                 }
             }
             for sections in &mut all {
-                sections.set(&set.grid, history[at].0.clone());
+                sections.set(std::slice::from_ref(&set.grid), history[at].0.clone());
                 assert!(check(sections, &set) == history[at].1, "seed {seed}");
             }
         }
         for sections in &mut all {
-            sections.set(&set.grid, Clip::default());
+            sections.set(std::slice::from_ref(&set.grid), Clip::default());
             assert!(check(sections, &set) == history[0].1);
         }
     }
@@ -193,21 +194,22 @@ fn a_small_move_works_on_the_blocks_it_changes() {
     let positions: Vec<[f32; 3]> = (0..40_000).map(|_| random.vector().to_array()).collect();
     let params = Params { resolution: Resolution::CellsPerParticle(1.0), block_cells: 2 };
     let grid = Grid::build(&positions[..], Radii::Uniform(0.001), None, params);
-    let mut sections = Sections::new(&grid, Visibility::all(&grid), Width::Four);
+    let mut sections =
+        Sections::new(std::slice::from_ref(&grid), vec![Visibility::all(&grid)], Width::Four);
     let at = |x: f64| {
         let plane = Plane::new(DVec3::new(x, 0.0, 0.0), DVec3::X).unwrap();
         Clause { faces: vec![Face { plane, cut: Cut::Caps, owner: 0 }] }
     };
     let clip = |x: &[f64]| Clip { clauses: x.iter().map(|x| at(*x)).collect() };
     let blocks = grid.blocks.iter().filter(|b| b.cells[0] > 0).count();
-    let half = sections.set(&grid, clip(&[0.0]));
+    let half = sections.set(std::slice::from_ref(&grid), clip(&[0.0]));
     assert!(half * 5 < blocks * 3, "{half} of {blocks}");
-    assert_eq!(sections.set(&grid, clip(&[0.0])), 0);
+    assert_eq!(sections.set(std::slice::from_ref(&grid), clip(&[0.0])), 0);
     // Where the first plane has cut everything away, the second adds to counters alone.
-    let more = sections.set(&grid, clip(&[0.0, -0.4]));
+    let more = sections.set(std::slice::from_ref(&grid), clip(&[0.0, -0.4]));
     assert!(more * 5 < blocks, "{more} of {blocks}");
-    assert_eq!(sections.set(&grid, clip(&[-0.4, 0.0])), 0);
-    let outside = sections.set(&grid, clip(&[-0.4, 0.0, -2.0]));
+    assert_eq!(sections.set(std::slice::from_ref(&grid), clip(&[-0.4, 0.0])), 0);
+    let outside = sections.set(std::slice::from_ref(&grid), clip(&[-0.4, 0.0, -2.0]));
     assert_eq!(outside, 0);
 }
 
@@ -216,15 +218,16 @@ fn several_planes_of_a_clause_keep_what_any_of_them_keeps() {
     let positions = [[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0]];
     let params = Params { resolution: Resolution::CellsPerParticle(1.0), block_cells: 2 };
     let grid = Grid::build(&positions[..], Radii::Uniform(0.2), None, params);
-    let mut sections = Sections::new(&grid, Visibility::all(&grid), Width::One);
+    let mut sections =
+        Sections::new(std::slice::from_ref(&grid), vec![Visibility::all(&grid)], Width::One);
     let face = |x: f64, to: f64| {
         let plane = Plane::new(DVec3::new(x, 0.0, 0.0), DVec3::new(to, 0.0, 0.0)).unwrap();
         Face { plane, cut: Cut::Center, owner: 0 }
     };
     let apart = Clause { faces: vec![face(-0.5, -1.0), face(0.5, 1.0)] };
-    sections.set(&grid, Clip { clauses: vec![apart] });
-    assert_eq!(sections.visible().visible(), 2);
+    sections.set(std::slice::from_ref(&grid), Clip { clauses: vec![apart] });
+    assert_eq!(sections.visible()[0].visible(), 2);
     let slab = [face(-0.5, 1.0), face(0.5, -1.0)].map(|f| Clause { faces: vec![f] });
-    sections.set(&grid, Clip { clauses: slab.to_vec() });
-    assert_eq!(sections.visible().visible(), 1);
+    sections.set(std::slice::from_ref(&grid), Clip { clauses: slab.to_vec() });
+    assert_eq!(sections.visible()[0].visible(), 1);
 }

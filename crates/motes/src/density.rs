@@ -37,7 +37,7 @@ impl Cloud {
     fn of(system: &Loaded, masked: bool) -> Self {
         let mut cloud = Self::default();
         let mut sum = 0.0;
-        for (grid, visible) in system.classes.grids.iter().zip(&system.visible) {
+        for (grid, visible) in system.classes.grids.iter().zip(system.visible()) {
             visit(grid, visible, |slot| {
                 cloud.positions.push(grid.center(slot).to_array());
                 cloud.radii.push(grid.radius_at(slot));

@@ -13,7 +13,9 @@
 
 mod annotate;
 pub mod bench;
+mod cut;
 mod density;
+mod entries;
 mod environment;
 mod error;
 mod info;

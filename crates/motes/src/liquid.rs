@@ -54,7 +54,7 @@ impl<'a> Matter<'a> {
         });
         let greatest = grids.iter().map(|g| g.greatest_radius).fold(0.0, f32::max);
         Self {
-            particles: Particles::Grids(grids, &system.visible),
+            particles: Particles::Grids(grids, system.visible()),
             visible: system.count_visible(),
             mean_radius: sum / count.max(1) as f64,
             greatest_radius: f64::from(greatest),

@@ -15,6 +15,7 @@ use motes_surface::MOST_MEDIA;
 
 use crate::annotate::{Annotated, annotations};
 use crate::density::Cast;
+use crate::entries::Entries;
 use crate::liquid::{Liquid, Matter};
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
@@ -356,15 +357,14 @@ impl Session {
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<_> = others.iter().map(Loaded::spheres).collect();
-        let paint = Paints(others);
+        let entries = Entries::new(others);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
         let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let corners = boxes.fold(nothing, |[low, high], b| {
             [low.min((b.min - origin).as_vec3()), high.max((b.max - origin).as_vec3())]
         });
-        let others = Others { systems: &systems, paint: &paint, bounds: corners };
-        let others = (!systems.is_empty()).then_some(others);
+        let others = Others { systems: &entries.spheres, paint: &entries, bounds: corners };
+        let others = (!entries.spheres.is_empty()).then_some(others);
         let scene = &self.scene;
         if scene.renderer == Renderer::Density {
             let cast = Cast { scene, system, resolved, bounds, origin, level, others };
@@ -395,10 +395,11 @@ impl Session {
     ) -> Result<Frame> {
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let systems: Vec<_> = loaded.iter().map(Loaded::spheres).collect();
+        let entries = Entries::new(loaded);
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
-        let view = View { rays: &rays, systems: &systems, paint: &Paints(loaded), lights: &lights };
+        let systems = &entries.spheres;
+        let view = View { rays: &rays, systems, paint: &entries, lights: &lights };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),
@@ -424,7 +425,7 @@ impl Session {
         stats.counts.insert("tests", traced.counts.tests);
         stats.counts.insert("spheres", traced.counts.spheres);
         let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
-        if layers { with_layers(frame, &traced.center, loaded) } else { Ok(frame) }
+        if layers { with_layers(frame, &traced.center, &entries) } else { Ok(frame) }
     }
 
     /// Tone, background and annotations.
@@ -447,27 +448,6 @@ impl Session {
         background.put_behind(&mut shown);
         annotations(&self.scene, resolved, annotated).draw(&mut shown);
         shown
-    }
-}
-
-/// The colours of all systems.
-struct Paints<'a>(&'a [Loaded]);
-
-impl motes_spheres::Paint for Paints<'_> {
-    fn color(&self, system: u16, index: u32) -> Vec3 {
-        self.0[system as usize].paint.color(index)
-    }
-
-    fn uniform(&self, system: u16) -> Option<Vec3> {
-        self.0[system as usize].paint.uniform()
-    }
-
-    fn opacity(&self, system: u16, index: u32) -> f32 {
-        self.0[system as usize].paint.opacity.of(index)
-    }
-
-    fn translucent(&self) -> bool {
-        self.0.iter().any(|l| !l.paint.opacity.is_opaque())
     }
 }
 
@@ -540,14 +520,14 @@ fn framed(loaded: &[Loaded], origin: DVec3) -> Vec<Bounds> {
     loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l))).collect()
 }
 
-fn with_layers(frame: Frame, center: &[Center], loaded: &[Loaded]) -> Result<Frame> {
+fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
+    // Where nothing is, the system is 0.
+    let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
     Ok(frame
         .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
         .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
         .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
-        .with(Layer::System(
-            center.iter().map(|c| loaded.get(c.system as usize).map_or(0, |l| l.number)).collect(),
-        ))?)
+        .with(Layer::System(center.iter().map(system).collect()))?)
 }
 
 fn count(stats: &mut Stats, loaded: &[Loaded]) {
@@ -560,7 +540,7 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
-    stats.bytes.insert("visibility", sum(&|l| l.visible.iter().map(|v| v.bytes()).sum()));
+    stats.bytes.insert("visibility", sum(&Loaded::visibility_bytes));
 }
 
 /// The name of an instruction set.

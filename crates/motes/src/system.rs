@@ -4,14 +4,15 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{BlockRanges, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
+use motes_grid::{BlockRanges, Clip, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, ColorBy, Scene, System};
+use motes_scene::{Bounds, ColorBy, Renderer, Scene, System};
 use motes_spheres::Spheres;
 
 use crate::annotate::box_shown;
+use crate::cut::{Body, Keep, Pass};
 use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::{Rule, Spacing};
 use crate::{Error, Result, radius};
@@ -24,7 +25,10 @@ pub(crate) struct Loaded {
     /// The simulation box, where it is shown.
     pub sim_box: Option<SimulationBox>,
     pub classes: RadiusClasses,
-    pub visible: Vec<Visibility>,
+    /// What the sections leave.
+    passes: Vec<Pass>,
+    /// What is visible of all passes, where there are several.
+    merged: Vec<Visibility>,
     pub paint: Paint,
 }
 
@@ -66,9 +70,84 @@ impl Loaded {
             // What is translucent hides nothing that coincides with it.
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
         }
-        let visible = visibility(&particles, &classes, system)?;
         let sim_box = box_shown(&particles, scene.overlay.r#box);
-        Ok(Self { number, particles, sim_box, classes, visible, paint })
+        let (passes, merged) = (Vec::new(), Vec::new());
+        let mut loaded = Self { number, particles, sim_box, classes, passes, merged, paint };
+        loaded.cut(scene, origin)?;
+        Ok(loaded)
+    }
+
+    /// A system without cuts.
+    pub fn uncut(
+        (particles, paint): (Arc<Particles>, Paint),
+        (classes, visible): (RadiusClasses, Vec<Visibility>),
+    ) -> Self {
+        let passes = vec![Pass::uncut(&classes, visible)];
+        Self { number: 0, particles, sim_box: None, classes, passes, merged: Vec::new(), paint }
+    }
+
+    /// Goes over to the sections of `scene`, in which nothing else has changed.
+    ///
+    /// # Errors
+    /// A section makes no sense here.
+    pub fn cut(&mut self, scene: &Scene, origin: DVec3) -> Result<()> {
+        let number = usize::from(self.number);
+        let first = scene.system.iter().position(|system| system.visible);
+        let body = Body {
+            particles: &self.particles,
+            classes: &self.classes,
+            number,
+            origin,
+            liquid: scene.renderer != Renderer::Spheres && first == Some(number),
+        };
+        let system = &scene.system[number];
+        let visible = |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
+        body.cut(scene, &mut self.passes, visible)?;
+        self.merged.clear();
+        if self.passes.len() > 1 {
+            let mut seen = vec![false; self.particles.len()];
+            self.passes.iter().for_each(|pass| self.mark(pass.visible(), &mut seen));
+            let keep = |i: u32| seen[i as usize];
+            let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
+            self.merged = self.classes.grids.iter().map(of).collect();
+        }
+        Ok(())
+    }
+
+    /// What is visible of the particles, grid by grid.
+    pub fn visible(&self) -> &[Visibility] {
+        match &self.passes[..] {
+            [pass] => pass.visible(),
+            _ => &self.merged,
+        }
+    }
+
+    /// The cuts of a liquid that its rays ask, if it has one; those of some types only are left out.
+    pub fn clip(&self) -> Option<&Clip> {
+        match &self.passes[..] {
+            [pass] => pass.clip(),
+            _ => None,
+        }
+    }
+
+    /// Bytes of what is visible.
+    pub fn visibility_bytes(&self) -> usize {
+        let merged = self.merged.iter().map(Visibility::bytes).sum::<usize>();
+        merged + self.passes.iter().map(Pass::bytes).sum::<usize>()
+    }
+
+    /// Sets `seen` of the particles that are `visible`.
+    fn mark(&self, visible: &[Visibility], seen: &mut [bool]) {
+        for (grid, visible) in self.classes.grids.iter().zip(visible) {
+            for block in 0..grid.blocks.len() - 1 {
+                let of = visible.block(grid, block);
+                for (i, slot) in grid.particles_of(block).enumerate() {
+                    if of.shows(i) {
+                        seen[grid.index(slot) as usize] = true;
+                    }
+                }
+            }
+        }
     }
 
     /// Where radii were measured in this frame, makes them the scene's for all frames.
@@ -84,7 +163,7 @@ impl Loaded {
 
     /// How many particles pass the filters.
     pub fn count_visible(&self) -> usize {
-        self.visible.iter().map(Visibility::visible).sum()
+        self.visible().iter().map(Visibility::visible).sum()
     }
 
     /// What is visible of each type that has visible particles, by its place among all types.
@@ -94,35 +173,30 @@ impl Loaded {
     pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
-        let grids = self.classes.grids.iter().zip(&self.visible);
-        for (grid, visible) in grids.clone() {
-            for block in 0..grid.blocks.len() - 1 {
-                let of = visible.block(grid, block);
-                for (i, slot) in grid.particles_of(block).enumerate() {
-                    if of.shows(i) {
-                        seen[grid.index(slot) as usize] = true;
-                    }
-                }
-            }
-        }
+        self.mark(self.visible(), &mut seen);
+        let grids = self.classes.grids.iter();
         let of_type = |kind: usize| {
             let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
-            let all = grids.clone().map(|(grid, _)| Visibility::where_all(grid, &[], Some(&keep)));
+            let all = grids.clone().map(|grid| Visibility::where_all(grid, &[], Some(&keep)));
             (kind, all.collect::<Vec<_>>())
         };
         let all = (0..types.len()).map(of_type);
         Ok(all.filter(|(_, v)| v.iter().any(|v| v.visible() > 0)).collect())
     }
 
-    /// What a tracer of spheres takes.
-    pub fn spheres(&self) -> Spheres<'_> {
-        Spheres { classes: &self.classes, visible: &self.visible }
+    /// What a tracer of spheres takes, pass by pass.
+    pub fn spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
+        self.passes.iter().enumerate().map(|(i, pass)| Spheres {
+            clip: pass.clip(),
+            continues: i > 0,
+            ..Spheres::new(&self.classes, pass.visible())
+        })
     }
 
     /// Boxes around what is visible, with radii, in world coordinates.
     pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
         let mut boxes = Vec::new();
-        for (grid, visible) in self.classes.grids.iter().zip(&self.visible) {
+        for (grid, visible) in self.classes.grids.iter().zip(self.visible()) {
             let blocks = 0..grid.blocks.len() - 1;
             let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
             boxes.extend(
@@ -135,11 +209,12 @@ impl Loaded {
     }
 }
 
-/// What the filters and the expression of a system let through.
+/// What the filters and the expression of a system let through, of the particles that are `kept` if that is said.
 pub(crate) fn visibility(
     particles: &Particles,
     classes: &RadiusClasses,
     system: &System,
+    kept: Option<Keep<'_>>,
 ) -> Result<Vec<Visibility>> {
     let selection: Option<Selection> = match system.r#where.trim() {
         "" => None,
@@ -157,8 +232,10 @@ pub(crate) fn visibility(
                 as Box<dyn Fn(u32) -> f32 + Sync>
         })
         .collect();
-    let contains = |i: u32| selection.as_ref().is_none_or(|s| s.contains(i));
-    let keep = selection.is_some().then_some(&contains as &(dyn Fn(u32) -> bool + Sync));
+    let contains = |i: u32| {
+        selection.as_ref().is_none_or(|s| s.contains(i)) && kept.is_none_or(|kept| kept(i))
+    };
+    let keep = (selection.is_some() || kept.is_some()).then_some(&contains as Keep<'_>);
     let of_grid = |grid: &Grid| {
         let ranges: Vec<BlockRanges> = values.iter().map(|v| BlockRanges::of(grid, v)).collect();
         let filters: Vec<Filter<'_>> = system

@@ -27,7 +27,7 @@ settings! {
         group: String = String::new(),
         /// Which systems it cuts, by name or number from 0; empty: all.
         system: Names = Names::default(),
-        /// Which types, elements or chains of particles it cuts; empty: all.
+        /// Which types or elements of particles it cuts; empty: all.
         types: Names = Names::default(),
         /// Colour of the caps: particle (each like its particle), hatched, a colour, or the name of a property, through the system's colour map.
         cap: CapColor = CapColor::Particle,

@@ -120,7 +120,7 @@ fn shafts_find_what_brute_force_finds() {
     for round in 0..60 {
         let scene =
             Scene::new(&mut random, 400, if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) });
-        let systems = [Spheres { classes: &scene.classes, visible: &scene.visible }];
+        let systems = [Spheres::new(&scene.classes, &scene.visible)];
         let axis = if round < 6 {
             [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z][round]
         } else {
@@ -150,7 +150,7 @@ fn beams_find_what_brute_force_finds() {
     for round in 0..80 {
         let scene =
             Scene::new(&mut random, 400, if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) });
-        let systems = [Spheres { classes: &scene.classes, visible: &scene.visible }];
+        let systems = [Spheres::new(&scene.classes, &scene.visible)];
         let direction = if round < 6 {
             [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z][round]
         } else {

@@ -7,7 +7,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd_macros::simd;
-use motes_grid::{Block, Grid, RadiusClasses, Seen, Visibility};
+use motes_grid::{Block, Clip, Grid, RadiusClasses, Seen, Visibility};
 
 use crate::frustum::{Bounds, Frustum};
 use crate::intersect::{Cull, Sphere, bits, cull, dim, farthest, intersect, optical_depth};
@@ -21,9 +21,19 @@ pub struct Spheres<'a> {
     pub classes: &'a RadiusClasses,
     /// One per grid.
     pub visible: &'a [Visibility],
+    /// The part of a ray on which these spheres are met; `None`: all of it. What is cut by centre is not
+    /// among the visible ones, and not asked here.
+    pub clip: Option<&'a Clip>,
+    /// Whether these are more particles of the grids of the system before: those that another clip cuts. They are
+    /// one system then, in which the lower index wins at equal depth.
+    pub continues: bool,
 }
 
-impl Spheres<'_> {
+impl<'a> Spheres<'a> {
+    /// What is visible of the particles of `classes`, uncut.
+    pub fn new(classes: &'a RadiusClasses, visible: &'a [Visibility]) -> Self {
+        Self { classes, visible, clip: None, continues: false }
+    }
     /// The grid that holds `slot`, and the place in it. Slots count through all grids of the system.
     pub fn locate(&self, slot: u32) -> (&Grid, usize) {
         let mut place = slot as usize;

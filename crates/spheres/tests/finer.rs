@@ -68,7 +68,7 @@ fn picture(
     let radii: Vec<f32> = spheres.iter().map(|s| s.1).collect();
     let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let systems = [Spheres { classes: &classes, visible: &visible }];
+    let systems = [Spheres::new(&classes, &visible)];
     let view = View { rays, systems: &systems, paint: &Gray(gray), lights };
     render(view, settings, &|_, _| true).unwrap()
 }

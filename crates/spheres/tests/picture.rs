@@ -62,7 +62,7 @@ fn picture(
     let radii: Vec<f32> = spheres.iter().map(|s| s.1).collect();
     let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let systems = [Spheres { classes: &classes, visible: &visible }];
+    let systems = [Spheres::new(&classes, &visible)];
     let view = View { rays, systems: &systems, paint: &White, lights };
     render(view, settings, &|_, _| true).unwrap()
 }
@@ -235,7 +235,7 @@ fn a_watch_can_cancel() {
     let positions: Vec<[f32; 3]> = spheres.iter().map(|s| s.0).collect();
     let classes = RadiusClasses::build(&positions, Radii::Uniform(0.1), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let systems = [Spheres { classes: &classes, visible: &visible }];
+    let systems = [Spheres::new(&classes, &visible)];
     let view = View { rays: &rays, systems: &systems, paint: &White, lights: &lights };
     assert!(render(view, settings(1), &|_, _| false).is_none());
 }

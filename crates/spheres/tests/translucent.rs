@@ -102,7 +102,7 @@ fn surfaces_come_in_exact_order() {
     let mut classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let spheres = [Spheres { classes: &classes, visible: &visible }];
+    let spheres = [Spheres::new(&classes, &visible)];
     // From outside, and from amid the spheres.
     for eye in [Vec3::new(2.0, -1.5, 1.0), Vec3::new(0.05, 0.02, -0.03)] {
         let rays: Vec<(Vec3, Vec3)> = (0..150u32)
@@ -154,7 +154,7 @@ fn picture(
 ) -> Picture {
     let classes = RadiusClasses::build(positions, Radii::Each(radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let systems = [Spheres { classes: &classes, visible: &visible }];
+    let systems = [Spheres::new(&classes, &visible)];
     let rays = rays();
     let view = View { rays: &rays, systems: &systems, paint, lights };
     let level = Level::new();

@@ -61,7 +61,7 @@ fn traced(
 ) -> Vec<Option<(f32, u32)>> {
     let classes = RadiusClasses::build(&scene.positions, Radii::Each(&scene.radii), params);
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let spheres = [Spheres { classes: &classes, visible: &visible }];
+    let spheres = [Spheres::new(&classes, &visible)];
     let n = (rays.len() as f64).sqrt() as usize;
     let mut hits = vec![None; rays.len()];
     let mut counts = Counts::default();
@@ -297,7 +297,7 @@ fn culling_spares_tests_and_changes_no_hit() {
     let classes =
         RadiusClasses::build(&scene.positions, Radii::Each(&scene.radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
-    let spheres = [Spheres { classes: &classes, visible: &visible }];
+    let spheres = [Spheres::new(&classes, &visible)];
     let (mut culling, mut testing) = (Packet::new(), Packet::new());
     testing.test_all();
     for (origin, direction) in rays(Vec3::new(3.0, 2.0, 1.0), Vec3::splat(0.5), 0.1, 8) {

@@ -272,7 +272,7 @@ impl Bench {
         let positions = loaded.cropped(range);
         let cropped =
             self.all.install(|| Built::new(&positions, loaded.radius, params(LAMBDA, BLOCK)));
-        let of = |visible| self.sphere_center(Spheres { classes: &built.classes, visible });
+        let of = |visible| self.sphere_center(Spheres::new(&built.classes, visible));
         let ways = [of(&bits), of(&visible), self.sphere_center(cropped.spheres())];
         let ways: Vec<_> =
             ways.iter().map(|way| (self.shot(rays, PACKET), way as &dyn Way)).collect();
@@ -282,7 +282,7 @@ impl Bench {
         cells.extend(all.iter().map(|(ms, _)| Cell::Frame(*ms)));
         cells.push(Cell::Factor(all[1].0 / all[2].0));
         let light = (&large_light(loaded)?, 0);
-        let spheres = Spheres { classes: &built.classes, visible: &visible };
+        let spheres = Spheres::new(&built.classes, &visible);
         let motes = |spheres| self.measure_product((rays, spheres), light, Primary::Project).0;
         let (culled, pre_crop) = (motes(spheres), motes(cropped.spheres()));
         cells.extend([Cell::Frame(culled), Cell::Frame(pre_crop)]);

@@ -87,7 +87,7 @@ impl Built {
     }
 
     pub fn spheres(&self) -> motes_spheres::Spheres<'_> {
-        motes_spheres::Spheres { classes: &self.classes, visible: &self.visible }
+        motes_spheres::Spheres::new(&self.classes, &self.visible)
     }
 
     /// Bytes beyond the particles' own.

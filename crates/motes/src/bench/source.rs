@@ -215,13 +215,13 @@ impl Bench {
                 let positions = particles.positions[..].into();
                 radius::classes(spare, positions, rule, scale, params)
             };
-            let visible = visibility(particles, &classes, system)?;
+            let visible = visibility(particles, &classes, system, None)?;
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;
         let paint = crate::paint::Paint::new(particles, system, None)?;
         let particles = Arc::clone(particles);
-        Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
+        Ok((ms, Loaded::uncut((particles, paint), (classes, visible))))
     }
 
     fn origin(&self) -> DVec3 {
@@ -238,7 +238,7 @@ impl Bench {
         }
         self.studio.draw(Shot {
             rays: &pose.view.rays(self.origin()),
-            spheres: Spheres { classes: &loaded.classes, visible: &loaded.visible },
+            spheres: Spheres::new(&loaded.classes, loaded.visible()),
             paint: &Colors(&loaded.paint),
             lights: &lights,
             samples: self.scene.image.samples,
@@ -270,7 +270,7 @@ impl Bench {
             ("input", self.particles.bytes()),
             ("data", grids.iter().map(motes_grid::Grid::data_bytes).sum()),
             ("grid", grids.iter().map(motes_grid::Grid::structure_bytes).sum()),
-            ("visibility", loaded.visible.iter().map(|v| v.bytes()).sum()),
+            ("visibility", loaded.visibility_bytes()),
         ];
         line.bytes.extend(bytes.map(|(name, bytes)| (name, bytes as u64)));
         let counted =

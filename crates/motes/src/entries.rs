@@ -1,0 +1,48 @@
+//! What tracers take of several systems: an entry for each pass of each.
+
+use glam::Vec3;
+use motes_spheres::Spheres;
+
+use crate::system::Loaded;
+
+/// The passes of all systems, and their colours.
+pub(crate) struct Entries<'a> {
+    loaded: &'a [Loaded],
+    pub spheres: Vec<Spheres<'a>>,
+    /// The system of each.
+    of: Vec<usize>,
+}
+
+impl<'a> Entries<'a> {
+    pub fn new(loaded: &'a [Loaded]) -> Self {
+        let mut entries = Self { loaded, spheres: Vec::new(), of: Vec::new() };
+        for (i, system) in loaded.iter().enumerate() {
+            entries.spheres.extend(system.spheres());
+            entries.of.resize(entries.spheres.len(), i);
+        }
+        entries
+    }
+
+    /// The system of an entry.
+    pub fn system(&self, entry: u16) -> &'a Loaded {
+        &self.loaded[self.of[entry as usize]]
+    }
+}
+
+impl motes_spheres::Paint for Entries<'_> {
+    fn color(&self, entry: u16, index: u32) -> Vec3 {
+        self.system(entry).paint.color(index)
+    }
+
+    fn uniform(&self, entry: u16) -> Option<Vec3> {
+        self.system(entry).paint.uniform()
+    }
+
+    fn opacity(&self, entry: u16, index: u32) -> f32 {
+        self.system(entry).paint.opacity.of(index)
+    }
+
+    fn translucent(&self) -> bool {
+        self.loaded.iter().any(|l| !l.paint.opacity.is_opaque())
+    }
+}
