@@ -4,8 +4,8 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::cut::Body;
 use crate::lanes::LANES;
-use crate::cut::{Body, Cuts};
 use crate::normals::gradients;
 use crate::rays::{Hits, OUTSIDE, Rays};
 use crate::shade::Liquid;

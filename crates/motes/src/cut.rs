@@ -62,7 +62,7 @@ pub(crate) struct Body<'a> {
     pub number: usize,
     /// What positions are given about.
     pub origin: DVec3,
-    /// Whether it is seen as a liquid, which is cut where rays pass: particles are left out by centre alone.
+    /// Whether it is seen as a liquid, which is cut where rays pass, not particle by particle.
     pub liquid: bool,
 }
 
@@ -70,6 +70,12 @@ pub(crate) struct Body<'a> {
 pub(crate) type Keep<'a> = &'a (dyn Fn(u32) -> bool + Sync);
 
 impl Body<'_> {
+    /// How far beyond a cut particles of a liquid still count, as gaps are bridged and surfaces smoothed over it.
+    fn margin(&self) -> f32 {
+        const RADII: f32 = 16.0;
+        RADII * self.classes.grids.iter().map(|grid| grid.greatest_radius).fold(0.0, f32::max)
+    }
+
     /// Cuts `passes` as the scene says: made anew where other particles than before are cut alike, else the
     /// blocks that change alone. `visible` is what passes the filters, of all particles or of those to be kept.
     ///
@@ -97,7 +103,7 @@ impl Body<'_> {
         for (pass, scope) in passes.iter_mut().zip(&scopes) {
             let clip = clip_of(&scope.sections, self.origin)?;
             pass.exact = clip.exact();
-            let clip = if self.liquid { clip.by_center() } else { clip };
+            let clip = if self.liquid { clip.of_liquid(self.margin()) } else { clip };
             pass.sections.set(&self.classes.grids, clip);
         }
         Ok(())

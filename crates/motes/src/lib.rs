@@ -20,6 +20,7 @@ mod environment;
 mod error;
 mod info;
 mod liquid;
+mod nearest;
 mod opacity;
 mod open;
 mod paint;

@@ -7,7 +7,7 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
-use motes_grid::Visibility;
+use motes_grid::{Clip, Visibility};
 use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Beyond, Bounds, CameraView, Environment, Lights, Resolved, Scene};
 use motes_surface::{
@@ -18,6 +18,7 @@ use motes_surface::{
 
 use crate::Result;
 use crate::environment::{FLOOR_FILL, WATER, environment};
+use crate::nearest::Nearest;
 use crate::paint;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
@@ -94,6 +95,22 @@ pub(crate) struct Liquid<'a> {
     pub level: Level,
     /// What stands before it and in it.
     pub others: Option<Others<'a>>,
+    /// Where it is cut open.
+    pub opened: Option<Opened<'a>>,
+}
+
+/// Cuts of a liquid, and where its particles are.
+#[derive(Clone, Copy)]
+pub(crate) struct Opened<'a> {
+    clip: &'a Clip,
+    nearest: &'a Nearest<'a>,
+}
+
+impl<'a> Opened<'a> {
+    /// The cuts of a liquid, if there are any.
+    pub fn of(system: &'a Loaded, nearest: &'a Option<Nearest<'a>>) -> Option<Self> {
+        system.clip().zip(nearest.as_ref()).map(|(clip, nearest)| Self { clip, nearest })
+    }
 }
 
 impl Liquid<'_> {
@@ -347,7 +364,12 @@ impl Liquid<'_> {
             stats.counts.insert("layers", made.layers as u64);
             stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
         }
-        let surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
+        let mut surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
+        if let Some(Opened { clip, nearest }) = self.opened {
+            let particle = |point| nearest.particle(point).unwrap_or(Spans::NO_PARTICLE);
+            surfaces = surfaces.cut(clip, &particle);
+            timed.lap("cut");
+        }
         stats.bytes.insert("surfaces", surfaces.bytes());
         surfaces
     }
@@ -376,7 +398,10 @@ impl Liquid<'_> {
         let light = CameraView::new(&camera, framing, size);
         let view = fitted(&light, size, (bounds, self.ball()), self.origin);
         let params = Params { ids: false, ..self.params(false) };
-        let (spans, _) = voxelize(boundary, &view, &params, self.level);
+        let (mut spans, _) = voxelize(boundary, &view, &params, self.level);
+        if let Some(Opened { clip, .. }) = self.opened {
+            spans = spans.cut(clip, &view);
+        }
         let mean = optics.absorption.element_sum() / 3.0;
         // What is opaque lets nothing through that is thicker than a ball.
         let extinction = match optics.mode {
@@ -407,8 +432,8 @@ impl<'a> Laps<'a> {
 }
 
 impl Paint for Liquid<'_> {
-    fn color(&self, particle: u32) -> Vec3 {
-        self.matter.paint.color(particle)
+    fn color(&self, particle: u32) -> Option<Vec3> {
+        self.painted().then(|| self.matter.paint.color(particle))
     }
 }
 

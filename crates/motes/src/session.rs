@@ -16,7 +16,8 @@ use motes_surface::MOST_MEDIA;
 use crate::annotate::{Annotated, annotations};
 use crate::density::Cast;
 use crate::entries::Entries;
-use crate::liquid::{Liquid, Matter};
+use crate::liquid::{Liquid, Matter, Opened};
+use crate::nearest::Nearest;
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
@@ -383,7 +384,11 @@ impl Session {
         }
         let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
         let media = &media[..];
-        Liquid { scene, matter, media, resolved, bounds, origin, level, others }.draw(layers, stats)
+        let nearest = system.clip().map(|_| Nearest::new(system));
+        let opened = Opened::of(system, &nearest);
+        let liquid =
+            Liquid { scene, matter, media, resolved, bounds, origin, level, others, opened };
+        liquid.draw(layers, stats)
     }
 
     fn trace(

@@ -176,9 +176,7 @@ impl Surfaces {
         for (end, own, other) in [(piece.entry, entry, entry + 1), (piece.exit, entry + 1, entry)] {
             let (nearness, normal, surface) = match end {
                 End::Own => (self.nearness[own], self.normals[own], own),
-                End::Cap(face, depth) => {
-                    (self.view.nearness(depth), pack(-face.plane.normal), own)
-                }
+                End::Cap(face, depth) => (self.view.nearness(depth), pack(-face.plane.normal), own),
                 End::Shell => {
                     let at = self.nearness[other];
                     let beside = if other > own { at.next_up() } else { at.next_down() };

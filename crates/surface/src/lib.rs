@@ -48,8 +48,8 @@ mod view;
 mod voxelize;
 
 pub use blocks::Blocks;
-pub use cut::{NO_CAP, Nearest};
 pub use boundary::{Boundary, BoundaryCounts};
+pub use cut::{NO_CAP, Nearest};
 pub use media::{MOST_MEDIA, Medium};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation, Spray};

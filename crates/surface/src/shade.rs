@@ -88,7 +88,11 @@ impl Around<'_> {
     }
 
     /// The same for a surface of the column at `place`, which may be a cap.
-    pub(crate) fn color_at(&self, surfaces: &Surfaces, (place, surface): ([usize; 2], usize)) -> Vec3 {
+    pub(crate) fn color_at(
+        &self,
+        surfaces: &Surfaces,
+        (place, surface): ([usize; 2], usize),
+    ) -> Vec3 {
         let owner = surfaces.caps.get(surface).filter(|owner| **owner != NO_CAP);
         let cap = self.paint.zip(owner).and_then(|(paint, owner)| {
             let place = place.map(|i| i as f32 + 0.5);

@@ -112,7 +112,8 @@ impl Studio {
         };
         let size = (scene.image.width, scene.image.height);
         let view = View { rays: resolved.view.rays(set.origin), size };
-        let liquid = Liquid { field: &self.field, space: &self.space, clip: None, level: Level::new() };
+        let liquid =
+            Liquid { field: &self.field, space: &self.space, clip: None, level: Level::new() };
         let finer = f64::from(scene.image.samples).sqrt().floor().max(1.0) as u32;
         Ok(shade(&liquid, &view, (&optics(scene, set.bounds), &around), finer))
     }

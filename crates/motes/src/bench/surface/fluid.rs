@@ -100,6 +100,7 @@ impl Fluid {
             origin: DVec3::from_array(self.particles.origin),
             level: Level::new(),
             others: None,
+            opened: None,
         }
     }
 
