@@ -36,6 +36,6 @@ pub use frame::{Frame, Layer, Values};
 pub use npz::write_npz;
 pub use panorama::{Panorama, read_panorama};
 pub use png::{PngOptions, Transparency, read_png, scene_in_png, write_png};
-pub use srgb::{Rgba8, linear_from_srgb, srgb_from_linear};
+pub use srgb::{Rgba8, linear_from_srgb, rgb8, srgb_from_linear};
 pub use ticks::{Ticks, ticks};
 pub use tone::{Curve, Tone};

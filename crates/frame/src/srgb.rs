@@ -104,8 +104,9 @@ fn encode(levels: &Levels, [r, g, b, a]: [f32; 4]) -> [u8; 4] {
     [levels.of(r / a), levels.of(g / a), levels.of(b / a), alpha]
 }
 
-/// Encodes without alpha: the premultiplied colour as it is, which is the picture over black.
-pub(crate) fn rgb8(frame: &Frame) -> Vec<u8> {
+/// Encodes without alpha: the premultiplied colour as it is, which is the picture over black. Three bytes a
+/// pixel.
+pub fn rgb8(frame: &Frame) -> Vec<u8> {
     let levels = &*LEVELS;
     let mut bytes = vec![0; frame.color().len() * 3];
     let pixels = bytes.par_chunks_exact_mut(3).with_min_len(1 << 14);

@@ -10,9 +10,81 @@ use motes_particles::read::names;
 use motes_scene::{Scene, Section};
 
 use crate::paint::{category_column, kinds_of};
+use crate::system::mark;
 use crate::{Error, Result};
 
+/// What is visible of a system: what passes the filters, less what sections cut away.
+#[derive(Clone)]
+pub(crate) struct Visible {
+    passes: Vec<Pass>,
+    /// What is visible of all passes, where there are several.
+    merged: Vec<Visibility>,
+}
+
+impl Visible {
+    /// What passes the filters, without cuts.
+    pub fn uncut(classes: &RadiusClasses, visible: Vec<Visibility>) -> Self {
+        Self { passes: vec![Pass::new(classes, (None, visible))], merged: Vec::new() }
+    }
+
+    /// What sections leave, to be cut.
+    pub fn nothing() -> Self {
+        Self { passes: Vec::new(), merged: Vec::new() }
+    }
+
+    /// Goes over to the sections of `scene`: made anew where other particles than before are cut alike, else the
+    /// blocks that change alone. `visible` is what passes the filters, of all particles or of those to be kept.
+    ///
+    /// # Errors
+    /// A section cannot be, or names types where there are none; or those of `visible`.
+    pub fn cut(
+        &mut self,
+        body: Body<'_>,
+        scene: &Scene,
+        visible: impl Fn(Option<Keep<'_>>) -> Result<Vec<Visibility>>,
+    ) -> Result<()> {
+        body.cut(scene, &mut self.passes, visible)?;
+        self.merged.clear();
+        if self.passes.len() > 1 {
+            let mut seen = vec![false; body.particles.len()];
+            self.passes.iter().for_each(|pass| mark(body.classes, pass.visible(), &mut seen));
+            let keep = |i: u32| seen[i as usize];
+            let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
+            self.merged = body.classes.grids.iter().map(of).collect();
+        }
+        Ok(())
+    }
+
+    /// Those that are cut alike.
+    pub fn passes(&self) -> &[Pass] {
+        &self.passes
+    }
+
+    /// All that is visible, grid by grid.
+    pub fn all(&self) -> &[Visibility] {
+        match &self.passes[..] {
+            [pass] => pass.visible(),
+            _ => &self.merged,
+        }
+    }
+
+    /// The cuts of a liquid that its rays ask, if there are any.
+    pub fn clip(&self) -> Option<&Clip> {
+        match &self.passes[..] {
+            [pass] => pass.clip(),
+            _ => None,
+        }
+    }
+
+    /// Bytes of all parts.
+    pub fn bytes(&self) -> usize {
+        let merged = self.merged.iter().map(Visibility::bytes).sum::<usize>();
+        merged + self.passes.iter().map(Pass::bytes).sum::<usize>()
+    }
+}
+
 /// Particles of a system that the same sections cut.
+#[derive(Clone)]
 pub(crate) struct Pass {
     /// Which they are, by kind; `None`: all.
     kinds: Option<Vec<bool>>,
@@ -22,11 +94,6 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    /// All particles, and what is visible of them, without cuts.
-    pub fn uncut(classes: &RadiusClasses, visible: Vec<Visibility>) -> Self {
-        Self::new(classes, (None, visible))
-    }
-
     fn new(classes: &RadiusClasses, (kinds, base): (Option<Vec<bool>>, Vec<Visibility>)) -> Self {
         let sections = Sections::new(&classes.grids, base, Width::default());
         Self { kinds, sections, exact: Clip::default() }
@@ -35,11 +102,6 @@ impl Pass {
     /// What is seen of them, grid by grid.
     pub fn visible(&self) -> &[Visibility] {
         self.sections.visible()
-    }
-
-    /// What would be seen of them without cuts.
-    pub fn all(&self) -> &[Visibility] {
-        self.sections.uncut()
     }
 
     /// Where rays meet them; `None`: everywhere.

@@ -129,7 +129,7 @@ pub fn info(series: &mut Series, frame: usize, progress: Progress<'_>) -> Result
     })
 }
 
-fn properties(particles: &Particles) -> Vec<PropertyInfo> {
+pub(crate) fn properties(particles: &Particles) -> Vec<PropertyInfo> {
     let mut properties = Vec::new();
     let bounds = particles.bounds();
     let axes: Vec<_> = (0..3).map(|i| bounds.map(|(low, high)| (low[i], high[i]))).collect();

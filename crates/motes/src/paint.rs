@@ -206,15 +206,31 @@ pub(crate) fn category_column<'a>(particles: &'a Particles, of: &[&str]) -> Resu
 fn categories(column: &Column, coloring: &Coloring, elements: bool) -> (How, Meaning) {
     let (kinds, names) = kinds_of(column);
     let color = |(i, name): (usize, &String)| {
-        let given = coloring.colors.get(name).copied();
-        let element = || Element::by_symbol(name).filter(|_| elements).map(|e| e.color);
-        let color = given.or_else(element).unwrap_or_else(|| coloring.palette.color(i));
-        Vec3::from(color.linear())
+        Vec3::from(color_of((i, name), coloring, elements).linear())
     };
     let colors: Vec<Vec3> = names.iter().enumerate().map(color).collect();
     let entries = names.into_iter().zip(colors.iter().copied()).collect();
     let meaning = Meaning::Categories { title: column.name.clone(), entries };
     (How::Kinds { kinds, colors }, meaning)
+}
+
+/// The colour of each type, where types have colours.
+pub(crate) fn type_colors(types: &Column, coloring: &Coloring) -> Vec<motes_scene::Color> {
+    let (_, names) = kinds_of(types);
+    let known = names.iter().all(|name| Element::by_symbol(name).is_some());
+    let elements = match coloring.by {
+        ColorBy::Element => true,
+        ColorBy::Auto => matches!(types.values, Values::Names { .. }) && known,
+        _ => false,
+    };
+    names.iter().enumerate().map(|(i, name)| color_of((i, name), coloring, elements)).collect()
+}
+
+/// The colour of the `i`-th kind, called `name`.
+fn color_of((i, name): (usize, &str), coloring: &Coloring, elements: bool) -> motes_scene::Color {
+    let given = coloring.colors.get(name).copied();
+    let element = || Element::by_symbol(name).filter(|_| elements).map(|e| e.color);
+    given.or_else(element).unwrap_or_else(|| coloring.palette.color(i))
 }
 
 /// The kind of each particle, counted from 0, and the kinds' names: names in order of appearance,

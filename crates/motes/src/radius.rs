@@ -27,7 +27,7 @@ pub(crate) enum Rule {
 }
 
 /// What is taken for the spacing of particles.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spacing {
     /// The median distance to the nearest neighbour.
     Nearest,

@@ -1,27 +1,23 @@
 //! A scene with its sources open: frames on demand.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use fearless_simd::Level;
-use glam::{DVec3, Vec3};
-use motes_frame::{Background, Curve, Frame, Layer, Tone};
-use motes_grid::RadiusClasses;
+use glam::DVec3;
+use motes_frame::{Background, Curve, Frame, Tone};
 use motes_particles::read::{Wanted, names};
-use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show};
-use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
-use motes_surface::MOST_MEDIA;
+use motes_particles::{Particles, Series, SimulationBox};
+use motes_scene::{
+    Bounds, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show,
+};
 
 use crate::annotate::{Annotated, annotations};
-use crate::density::Cast;
-use crate::entries::Entries;
-use crate::liquid::{Liquid, Matter, Opened};
-use crate::nearest::Nearest;
+use crate::cut::Visible;
+use crate::drawing::Drawing;
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
-use crate::scenery::Others;
+use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
 use crate::system::Loaded;
 use crate::{Error, Result};
@@ -53,6 +49,8 @@ impl From<usize> for Shot {
 
 /// Room for a legend, in heights of its text.
 const LEGEND_EMS: f64 = 8.0;
+/// What is told of several frames ends at some point.
+const MOST_NOTES: usize = 100;
 
 /// Is told of long work, from any thread.
 pub trait Watch: Sync {
@@ -82,14 +80,19 @@ enum After {
 /// A scene whose sources are open.
 pub struct Session {
     scene: Scene,
-    series: Vec<Series>,
+    series: Vec<Arc<Mutex<Series>>>,
     pool: Option<rayon::ThreadPool>,
-    /// The grids of each system's last frame, for the memory they have.
-    spare: Vec<RadiusClasses>,
+    /// What was made of each system's last frame.
+    stages: Vec<Stages>,
+    /// Boxes around what is to be framed, and what they are around.
+    framed: Option<(Vec<Framed>, Arc<Vec<Bounds>>)>,
+    renderer: motes_spheres::Renderer,
     /// Whether the view was held for several frames.
     film: bool,
-    /// Colour range per system over its whole series, once it was asked for.
-    ranges: Vec<Option<[f64; 2]>>,
+    /// Colour range per system over its whole series, once it was asked for, and of what.
+    ranges: Vec<Option<(RangeKey, Option<[f64; 2]>)>>,
+    /// Whether columns are read that the scene does not need.
+    all_columns: bool,
     /// What could not be drawn.
     notes: Vec<String>,
 }
@@ -107,10 +110,45 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
-        let ranges = vec![None; series.len()];
-        let spare = series.iter().map(|_| RadiusClasses::default()).collect();
-        Ok(Self { scene, series, pool, spare, film: false, ranges, notes: Vec::new() })
+        let series = scene.system.iter().map(|s| Ok(Arc::new(Mutex::new(open(&s.source)?))));
+        let series = series.collect::<Result<Vec<_>>>()?;
+        Ok(Self { pool, ..Self::of(scene, series) })
+    }
+
+    fn of(scene: Scene, series: Vec<Arc<Mutex<Series>>>) -> Self {
+        Self {
+            scene,
+            pool: None,
+            stages: series.iter().map(|_| Stages::default()).collect(),
+            framed: None,
+            renderer: motes_spheres::Renderer::new(),
+            film: false,
+            ranges: vec![None; series.len()],
+            all_columns: false,
+            notes: Vec::new(),
+            series,
+        }
+    }
+
+    /// Another session with the same open sources and, to begin with, the same scene. Frames are read
+    /// once for both, with every column.
+    pub fn share(&self) -> Self {
+        Self { all_columns: true, ..Self::of(self.scene.clone(), self.series.clone()) }
+    }
+
+    /// Goes on with another scene of the same sources; what does not depend on the change is not made
+    /// again.
+    ///
+    /// # Errors
+    /// The scene makes no sense, or has other sources.
+    pub fn set_scene(&mut self, scene: Scene) -> Result<()> {
+        scene.check()?;
+        let sources = |s: &Scene| s.system.iter().map(|s| s.source.clone()).collect::<Vec<_>>();
+        if sources(&scene) != sources(&self.scene) {
+            return Err(Error::Usage("the scene has other sources than those that are open".into()));
+        }
+        self.scene = scene;
+        Ok(())
     }
 
     /// The scene.
@@ -124,13 +162,13 @@ impl Session {
     /// A source cannot be read.
     pub fn frames(&mut self, watch: &dyn Watch) -> Result<usize> {
         let report = |done, total| _ = watch.progress("count", done, total);
-        let counts = self.series.iter_mut().map(|s| s.frames(&report));
+        let counts = self.series.iter().map(|s| lock(s).frames(&report));
         Ok(counts.collect::<motes_particles::Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
     }
 
     /// What was odd in the sources but could be read, and what could not be drawn.
     pub fn warnings(&self) -> Vec<String> {
-        let of_series = self.series.iter().flat_map(Series::warnings);
+        let of_series = self.series.iter().flat_map(|s| lock(s).warnings());
         of_series.chain(self.notes.iter().cloned()).collect()
     }
 
@@ -181,59 +219,104 @@ impl Session {
         layers: Layers,
         watch: &dyn Watch,
     ) -> Result<Picture> {
-        let frame = shot.frame;
+        let drawn = self.draw((shot, after), layers, watch)?;
+        let mut stats = drawn.stats;
+        let start = Instant::now();
+        let annotated =
+            Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
+        let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated);
+        stats.ms.insert("finish", milliseconds(start));
+        stats.hash = format!("{:016x}", drawn.raw.hash());
+        stats.peak_memory = peak_memory_bytes();
+        Ok(Picture {
+            raw: drawn.raw,
+            shown,
+            stats,
+            scene: drawn.scene.to_toml(),
+            transparent: self.scene.image.transparent,
+        })
+    }
+
+    /// A picture as it is shown, and what it is of. The hash is made only if it is asked for.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub(crate) fn look(&mut self, frame: usize, hashed: bool, watch: &dyn Watch) -> Result<Look> {
+        let drawn = self.draw((frame.into(), After::Kept), Layers::No, watch)?;
+        let Drawn { raw, mut stats, loaded, resolved, boxes, .. } = drawn;
+        let hash = if hashed { raw.hash() } else { 0 };
+        let start = Instant::now();
+        let annotated = Annotated { systems: &loaded, frame, film: self.film };
+        let shown = self.finish(raw, &resolved, &annotated);
+        stats.ms.insert("finish", milliseconds(start));
+        Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, frame } })
+    }
+
+    /// What there is to be seen of the scene's frame, before anything is drawn.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub(crate) fn survey(&mut self, watch: &dyn Watch) -> Result<Seen> {
+        let frame = self.scene.image.frame as usize;
+        let particles = self.read(frame, After::Kept, watch)?;
+        let (loaded, origin) = self.load(particles)?;
+        let boxes = self.framed(&loaded, origin);
+        let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
+        Ok(Seen { loaded, resolved, boxes, frame })
+    }
+
+    /// The picture without tone and what is drawn over it.
+    fn draw(
+        &mut self,
+        (shot, after): (Shot, After),
+        layers: Layers,
+        watch: &dyn Watch,
+    ) -> Result<Drawn> {
         let mut stats = Stats { threads: rayon::current_num_threads(), ..Stats::default() };
         let start = Instant::now();
-        let particles = self.read(frame, after, watch)?;
+        let particles = self.read(shot.frame, after, watch)?;
         stats.ms.insert("read", milliseconds(start));
         let input = particles.iter().flatten().map(|p| p.bytes()).sum();
         stats.bytes.insert("input", input);
 
         let start = Instant::now();
         let (loaded, origin) = self.load(particles)?;
+        let boxes = self.framed(&loaded, origin);
         stats.ms.insert("build", milliseconds(start));
-        for l in loaded.iter().filter(|l| l.classes.left_out > 0) {
-            self.notes.push(format!(
-                "{}: frame {frame}: {} of {} particles are not drawn: their position is not finite, \
-                 or their radius not above zero",
-                self.scene.system[l.number as usize].source,
-                l.classes.left_out,
-                l.particles.len()
-            ));
-        }
+        self.note_left_out(&loaded, shot.frame);
 
-        let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth.
         let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
-        let raw = match self.scene.renderer {
-            Renderer::Spheres => {
-                self.trace(&loaded, (&resolved, origin), layers, (&mut stats, watch))?
-            }
-            Renderer::Surface | Renderer::Density => {
-                let bounds = boxes.iter().copied().reduce(Bounds::union);
-                self.flow(&loaded, (&resolved, origin, bounds), layers, (&mut stats, watch))?
-            }
+        let drawing = Drawing {
+            scene: &self.scene,
+            loaded: &loaded,
+            resolved: &resolved,
+            origin,
+            bounds: boxes.iter().copied().reduce(Bounds::union),
+            renderer: &self.renderer,
         };
+        let raw = drawing.draw(layers, (&mut stats, watch))?;
         stats.ms.insert("trace", milliseconds(start));
-
-        let start = Instant::now();
-        let annotated = Annotated { systems: &loaded, frame, film: self.film };
-        let shown = self.finish(&raw, &resolved, &annotated);
-        stats.ms.insert("finish", milliseconds(start));
         count(&mut stats, &loaded);
-        stats.hash = format!("{:016x}", raw.hash());
-        stats.peak_memory = peak_memory_bytes();
-        loaded.into_iter().for_each(|l| self.spare[l.number as usize] = l.classes);
-        Ok(Picture {
-            raw,
-            shown,
-            stats,
-            scene: scene.to_toml(),
-            transparent: self.scene.image.transparent,
-        })
+        Ok(Drawn { raw, stats, scene, resolved, loaded, boxes })
+    }
+
+    fn note_left_out(&mut self, loaded: &[Loaded], frame: usize) {
+        for l in loaded.iter().filter(|l| l.classes.left_out > 0) {
+            let note = format!(
+                "{}: frame {frame}: {} of {} particles are not drawn: their position is not finite, \
+                 or their radius not above zero",
+                self.scene.system[l.number as usize].source,
+                l.classes.left_out,
+                l.particles.len()
+            );
+            if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
     }
 
     /// The scene of one picture, which shows it again: its camera stands.
@@ -271,10 +354,12 @@ impl Session {
         looks.dedup();
         let (mut boxes, mut last) = (Vec::new(), Vec::new());
         for frame in looks {
+            // Grids that nobody looks at lend their memory to the next.
+            last.clear();
             let particles = self.read(frame, After::Kept, watch)?;
             let (loaded, origin) = self.load(particles)?;
             loaded.iter().for_each(|l| l.hold_radius(&mut self.scene));
-            boxes.extend(framed(&loaded, origin));
+            boxes.extend_from_slice(&self.framed(&loaded, origin));
             last = loaded;
         }
         let framing = self.framing(&last, &boxes);
@@ -285,11 +370,7 @@ impl Session {
 
     /// What the camera shows: all of `boxes`, beside the legend where there is one.
     fn framing<'a>(&self, loaded: &[Loaded], boxes: &'a [Bounds]) -> Framing<'a> {
-        let image = &self.scene.image;
-        let legend = self.scene.overlay.legend != Show::Off
-            && loaded.iter().any(|l| !matches!(l.paint.meaning, Meaning::Nothing));
-        let text = self.scene.overlay.text_size * f64::from(image.height) / f64::from(image.width);
-        Framing { boxes, free_right: if legend { LEGEND_EMS * text } else { 0.0 } }
+        Framing { boxes, free_right: free_right(&self.scene, loaded) }
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
@@ -298,11 +379,27 @@ impl Session {
         let mut loaded = Vec::new();
         for (i, particles) in particles.into_iter().enumerate() {
             let Some(particles) = particles else { continue };
-            let spare = std::mem::take(&mut self.spare[i]);
             let of = (&self.scene, &self.scene.system[i]);
-            loaded.push(Loaded::new((particles, spare), of, (i as u16, origin), self.ranges[i])?);
+            let range = self.ranges[i].as_ref().and_then(|(_, range)| *range);
+            loaded.push(self.stages[i].load(particles, of, (i as u16, origin), range)?);
         }
         Ok((loaded, origin))
+    }
+
+    /// Boxes around all that is to be framed.
+    fn framed(&mut self, loaded: &[Loaded], origin: DVec3) -> Arc<Vec<Bounds>> {
+        let key: Vec<_> = loaded.iter().map(|l| Framed::of(l, origin)).collect();
+        if let Some((_, boxes)) = self.framed.as_ref().filter(|(had, _)| *had == key) {
+            return boxes.clone();
+        }
+        let of_box = |l: &Loaded| {
+            let corners = l.sim_box?.corners();
+            Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
+        };
+        let boxes = loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l)));
+        let boxes = Arc::new(boxes.collect::<Vec<_>>());
+        self.framed = Some((key, boxes.clone()));
+        boxes
     }
 
     /// Reads the frame of every visible system; `None` for hidden ones.
@@ -325,17 +422,25 @@ impl Session {
                 Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
             })?;
             // Beside a series, what has one frame stands still.
-            let still = own > 0 && self.series.len() > 1 && self.series[i].frames(&report)? == 1;
+            let mut series = lock(&self.series[i]);
+            let still = own > 0 && self.series.len() > 1 && series.frames(&report)? == 1;
             let own = if still { 0 } else { own };
             let mut wanted = wanted(system);
             let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
             if masked && let Wanted::Only(columns) = &mut wanted {
                 columns.push(names::PARTICLE_MASK.into());
             }
-            if self.ranges[i].is_none() && system.color.range_over == RangeOver::Series {
-                self.ranges[i] = series_range(&mut self.series[i], system, &wanted, watch)?;
+            if self.all_columns {
+                wanted = Wanted::All;
             }
-            let series = &mut self.series[i];
+            let key = RangeKey::of(system);
+            if self.ranges[i].as_ref().map(|(had, _)| had) != key.as_ref() {
+                self.ranges[i] = None;
+            }
+            if let Some(key) = key.filter(|_| self.ranges[i].is_none()) {
+                let range = series_range(&mut series, system, &wanted, watch)?;
+                self.ranges[i] = Some((key, range));
+            }
             all.push(Some(match after {
                 After::Kept => series.frame(own, &wanted, &report)?,
                 After::LetGo => Arc::new(series.take(own, &wanted, &report)?),
@@ -344,99 +449,10 @@ impl Session {
         Ok(all)
     }
 
-    /// The first system as a liquid, the others as spheres before it and in it.
-    fn flow(
-        &self,
-        loaded: &[Loaded],
-        (resolved, origin, bounds): (&Resolved, DVec3, Option<Bounds>),
-        layers: bool,
-        (stats, watch): (&mut Stats, &dyn Watch),
-    ) -> Result<Frame> {
-        let [system, others @ ..] = loaded else {
-            let name = if self.scene.renderer == Renderer::Density { "density" } else { "surface" };
-            return Err(Error::Usage(format!("renderer {name}: no system is visible")));
-        };
-        let level = Level::new();
-        stats.simd = instruction_set(level).into();
-        let entries = Entries::new(others);
-        let boxes = others.iter().flat_map(|l| l.boxes(origin));
-        let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
-        let corners = boxes.fold(nothing, |[low, high], b| {
-            [low.min((b.min - origin).as_vec3()), high.max((b.max - origin).as_vec3())]
-        });
-        let others = Others { systems: &entries.spheres, paint: &entries, bounds: corners };
-        let others = (!entries.spheres.is_empty()).then_some(others);
-        let scene = &self.scene;
-        if scene.renderer == Renderer::Density {
-            let cast = Cast { scene, system, resolved, bounds, origin, level, others };
-            return cast.draw(layers, (stats, watch));
-        }
-        let matter = Matter::of(system);
-        let types = match scene.surface.media {
-            motes_scene::surface::Media::One => Vec::new(),
-            motes_scene::surface::Media::Types => system.visible_by_type()?,
-        };
-        if types.len() > MOST_MEDIA {
-            return Err(Error::Usage(format!(
-                "surface.media = types: {} types are visible, expected at most {MOST_MEDIA}",
-                types.len()
-            )));
-        }
-        let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
-        let media = &media[..];
-        let nearest = system.clip().map(|_| Nearest::new(system));
-        let opened = Opened::of(system, &nearest);
-        let liquid =
-            Liquid { scene, matter, media, resolved, bounds, origin, level, others, opened };
-        liquid.draw(layers, stats)
-    }
-
-    fn trace(
-        &self,
-        loaded: &[Loaded],
-        (resolved, origin): (&Resolved, DVec3),
-        layers: bool,
-        (stats, watch): (&mut Stats, &dyn Watch),
-    ) -> Result<Frame> {
-        let level = Level::new();
-        stats.simd = instruction_set(level).into();
-        let entries = Entries::new(loaded);
-        let rays = resolved.view.rays(origin);
-        let lights = resolved.lights.about(origin);
-        let systems = &entries.spheres;
-        let view = View { rays: &rays, systems, paint: &entries, lights: &lights };
-        let image = &self.scene.image;
-        let settings = Settings {
-            size: (image.width, image.height),
-            samples: image.samples,
-            primary: match self.scene.spheres.primary {
-                motes_scene::Primary::Project => Primary::Project,
-                motes_scene::Primary::Trace => Primary::Trace,
-            },
-            packet: self.scene.spheres.packet,
-            layers,
-            finer: Finer {
-                adaptive: Some(Adaptive {
-                    most: image.max_samples,
-                    noise: image.noise as f32,
-                    exposure: image.exposure.exp2() as f32,
-                }),
-                lens: resolved.view.lens,
-            },
-            level,
-        };
-        let tell = |done, total| watch.progress("render", done, total);
-        let traced = motes_spheres::render(view, settings, &tell).ok_or(Error::Cancelled)?;
-        stats.counts.insert("tests", traced.counts.tests);
-        stats.counts.insert("spheres", traced.counts.spheres);
-        let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
-        if layers { with_layers(frame, &traced.center, &entries) } else { Ok(frame) }
-    }
-
     /// Tone, background and annotations.
-    fn finish(&self, raw: &Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
+    fn finish(&self, raw: Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
         let image = &self.scene.image;
-        let mut shown = raw.clone();
+        let mut shown = raw;
         let curve = match image.tone {
             motes_scene::Tone::None => Curve::Standard,
             motes_scene::Tone::Filmic => Curve::Filmic,
@@ -456,8 +472,82 @@ impl Session {
     }
 }
 
+/// Part of the picture's width that is kept free for a legend.
+pub(crate) fn free_right(scene: &Scene, loaded: &[Loaded]) -> f64 {
+    let image = &scene.image;
+    let legend = scene.overlay.legend != Show::Off
+        && loaded.iter().any(|l| !matches!(l.paint.meaning, Meaning::Nothing));
+    let text = scene.overlay.text_size * f64::from(image.height) / f64::from(image.width);
+    if legend { LEGEND_EMS * text } else { 0.0 }
+}
+
+/// Locks a series, which is whole whoever held it.
+fn lock(series: &Mutex<Series>) -> MutexGuard<'_, Series> {
+    series.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A picture before it is finished, and what it is of.
+struct Drawn {
+    raw: Frame,
+    stats: Stats,
+    scene: Scene,
+    resolved: Resolved,
+    loaded: Vec<Loaded>,
+    boxes: Arc<Vec<Bounds>>,
+}
+
+/// A finished picture, and what it is of.
+pub(crate) struct Look {
+    pub shown: Frame,
+    /// The hash of the picture before annotations; 0 if none was asked for.
+    pub hash: u64,
+    pub stats: Stats,
+    pub seen: Seen,
+}
+
+/// What a picture is of.
+#[derive(Clone)]
+pub(crate) struct Seen {
+    pub loaded: Vec<Loaded>,
+    pub resolved: Resolved,
+    pub boxes: Arc<Vec<Bounds>>,
+    pub frame: usize,
+}
+
+/// What boxes were made around.
+struct Framed {
+    visible: Arc<Visible>,
+    sim_box: Option<SimulationBox>,
+    origin: DVec3,
+}
+
+impl Framed {
+    fn of(loaded: &Loaded, origin: DVec3) -> Self {
+        Self { visible: loaded.visible.clone(), sim_box: loaded.sim_box, origin }
+    }
+}
+
+impl PartialEq for Framed {
+    fn eq(&self, other: &Self) -> bool {
+        let same = Arc::ptr_eq(&self.visible, &other.visible);
+        same && self.sim_box == other.sim_box && self.origin == other.origin
+    }
+}
+
+/// What the range of colours over a series is of; none where it is the frame's.
+#[derive(Clone, PartialEq)]
+struct RangeKey(ColorBy, Component, bool);
+
+impl RangeKey {
+    fn of(system: &motes_scene::System) -> Option<Self> {
+        let color = &system.color;
+        let series = color.range_over == RangeOver::Series;
+        series.then(|| Self(color.by.clone(), color.component, color.log))
+    }
+}
+
 /// Makes a path absolute, so that a picture can be drawn again from any directory.
-fn make_absolute(source: &mut String) {
+pub(crate) fn make_absolute(source: &mut String) {
     let is_path = !source.starts_with("demo:") && !source.starts_with("sim:");
     if is_path && let Ok(path) = std::path::absolute(&*source) {
         *source = path.to_string_lossy().into_owned();
@@ -516,25 +606,6 @@ fn series_range(
     Ok(range)
 }
 
-/// Boxes around all that is to be framed.
-fn framed(loaded: &[Loaded], origin: DVec3) -> Vec<Bounds> {
-    let of_box = |l: &Loaded| {
-        let corners = l.sim_box?.corners();
-        Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
-    };
-    loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l))).collect()
-}
-
-fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
-    // Where nothing is, the system is 0.
-    let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
-    Ok(frame
-        .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
-        .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
-        .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
-        .with(Layer::System(center.iter().map(system).collect()))?)
-}
-
 fn count(stats: &mut Stats, loaded: &[Loaded]) {
     let sum = |f: &dyn Fn(&Loaded) -> usize| loaded.iter().map(f).sum::<usize>();
     let grids = |f: &dyn Fn(&motes_grid::Grid) -> usize| {
@@ -545,21 +616,5 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
-    stats.bytes.insert("visibility", sum(&Loaded::visibility_bytes));
-}
-
-/// The name of an instruction set.
-pub(crate) fn instruction_set(level: Level) -> &'static str {
-    match level {
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx512(_) => "AVX-512",
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx2(_) => "AVX2",
-        // Nothing is compiled for SSE4.2 alone.
-        #[cfg(target_arch = "x86_64")]
-        Level::Sse4_2(_) | Level::Sse2(_) => "SSE2",
-        #[cfg(target_arch = "aarch64")]
-        Level::Neon(_) => "NEON",
-        _ => "scalar",
-    }
+    stats.bytes.insert("visibility", sum(&|l| l.visible.bytes()));
 }

@@ -1,158 +1,34 @@
 //! One particle system of one frame: its grids, what is visible of them, and its colours.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{
-    BlockRanges, Clip, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility,
-};
+use motes_grid::{BlockRanges, Clip, Filter, Grid, RadiusClasses, Seen, Visibility};
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, ColorBy, Renderer, Scene, System};
+use motes_scene::{Bounds, ColorBy, Scene, System};
 use motes_spheres::Spheres;
 
-use crate::annotate::box_shown;
-use crate::cut::{Body, Keep, Pass};
+use crate::cut::{Keep, Visible};
 use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::{Rule, Spacing};
 use crate::{Error, Result, radius};
 
-/// A system ready to be drawn.
+/// A system ready to be drawn; [`crate::stages::Stages`] makes it.
+#[derive(Clone)]
 pub(crate) struct Loaded {
     /// Its place in the scene.
     pub number: u16,
     pub particles: Arc<Particles>,
     /// The simulation box, where it is shown.
     pub sim_box: Option<SimulationBox>,
-    pub classes: RadiusClasses,
-    /// What the sections leave.
-    passes: Vec<Pass>,
-    /// What is visible of all passes, where there are several.
-    merged: Vec<Visibility>,
-    pub paint: Paint,
+    pub classes: Arc<RadiusClasses>,
+    pub visible: Arc<Visible>,
+    pub paint: Arc<Paint>,
 }
 
 impl Loaded {
-    /// Builds the grids of `particles` about the scene's `origin`, and what is visible of them. Of
-    /// particles that nobody else holds the positions are let go once the grids hold them. They are built in the
-    /// memory of `spare`, such as those of the last frame.
-    ///
-    /// # Errors
-    /// A filter or colour names a property that is not there; an expression makes no sense.
-    pub fn new(
-        (mut particles, spare): (Arc<Particles>, RadiusClasses),
-        (scene, system): (&Scene, &System),
-        (number, origin): (u16, DVec3),
-        range: Option<[f64; 2]>,
-    ) -> Result<Self> {
-        let rule = radius::rule(&particles, system, Spacing::of(scene, number as usize));
-        let params = Params {
-            resolution: Resolution::CellsPerParticle(scene.spheres.lambda as f32),
-            block_cells: scene.spheres.block,
-        };
-        let scale = system.radius_scale as f32;
-        let shift = DVec3::from_array(particles.origin) - origin;
-        let keeps = asks_for_positions(&particles, system);
-        let own = Arc::get_mut(&mut particles).filter(|_| !keeps);
-        let mut positions = match own.map(Particles::take_positions) {
-            Some(positions) => Cow::Owned(positions),
-            None => Cow::Borrowed(&particles.positions[..]),
-        };
-        if shift != DVec3::ZERO {
-            let about = |p: &mut [f32; 3]| {
-                *p = (Vec3::from_array(*p).as_dvec3() + shift).as_vec3().to_array();
-            };
-            positions.to_mut().iter_mut().for_each(about);
-        }
-        let mut classes = radius::classes(spare, positions, rule, scale, params);
-        let paint = Paint::new(&particles, system, range)?;
-        if !paint.opacity.is_opaque() {
-            // What is translucent hides nothing that coincides with it.
-            classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
-        }
-        let sim_box = box_shown(&particles, scene.overlay.r#box);
-        let (passes, merged) = (Vec::new(), Vec::new());
-        let mut loaded = Self { number, particles, sim_box, classes, passes, merged, paint };
-        loaded.cut(scene, origin)?;
-        Ok(loaded)
-    }
-
-    /// A system without cuts.
-    pub fn uncut(
-        (particles, paint): (Arc<Particles>, Paint),
-        (classes, visible): (RadiusClasses, Vec<Visibility>),
-    ) -> Self {
-        let passes = vec![Pass::uncut(&classes, visible)];
-        Self { number: 0, particles, sim_box: None, classes, passes, merged: Vec::new(), paint }
-    }
-
-    /// Goes over to the sections of `scene`, in which nothing else has changed.
-    ///
-    /// # Errors
-    /// A section makes no sense here.
-    pub fn cut(&mut self, scene: &Scene, origin: DVec3) -> Result<()> {
-        let number = usize::from(self.number);
-        let first = scene.system.iter().position(|system| system.visible);
-        let body = Body {
-            particles: &self.particles,
-            classes: &self.classes,
-            number,
-            origin,
-            liquid: scene.renderer != Renderer::Spheres && first == Some(number),
-        };
-        let system = &scene.system[number];
-        let visible =
-            |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
-        body.cut(scene, &mut self.passes, visible)?;
-        self.merged.clear();
-        if self.passes.len() > 1 {
-            let mut seen = vec![false; self.particles.len()];
-            self.passes.iter().for_each(|pass| self.mark(pass.visible(), &mut seen));
-            let keep = |i: u32| seen[i as usize];
-            let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
-            self.merged = self.classes.grids.iter().map(of).collect();
-        }
-        Ok(())
-    }
-
-    /// What is visible of the particles, grid by grid.
-    pub fn visible(&self) -> &[Visibility] {
-        match &self.passes[..] {
-            [pass] => pass.visible(),
-            _ => &self.merged,
-        }
-    }
-
-    /// The cuts of a liquid that its rays ask, if it has one; those of some types only are left out.
-    pub fn clip(&self) -> Option<&Clip> {
-        match &self.passes[..] {
-            [pass] => pass.clip(),
-            _ => None,
-        }
-    }
-
-    /// Bytes of what is visible.
-    pub fn visibility_bytes(&self) -> usize {
-        let merged = self.merged.iter().map(Visibility::bytes).sum::<usize>();
-        merged + self.passes.iter().map(Pass::bytes).sum::<usize>()
-    }
-
-    /// Sets `seen` of the particles that are `visible`.
-    fn mark(&self, visible: &[Visibility], seen: &mut [bool]) {
-        for (grid, visible) in self.classes.grids.iter().zip(visible) {
-            for block in 0..grid.blocks.len() - 1 {
-                let of = visible.block(grid, block);
-                for (i, slot) in grid.particles_of(block).enumerate() {
-                    if of.shows(i) {
-                        seen[grid.index(slot) as usize] = true;
-                    }
-                }
-            }
-        }
-    }
-
     /// Where radii were measured in this frame, makes them the scene's for all frames.
     pub fn hold_radius(&self, scene: &mut Scene) {
         let spacing = Spacing::of(scene, self.number as usize);
@@ -169,6 +45,16 @@ impl Loaded {
         self.visible().iter().map(Visibility::visible).sum()
     }
 
+    /// What is visible of the particles, grid by grid.
+    pub fn visible(&self) -> &[Visibility] {
+        self.visible.all()
+    }
+
+    /// The cuts of a liquid that its rays ask, if it has one.
+    pub fn clip(&self) -> Option<&Clip> {
+        self.visible.clip()
+    }
+
     /// What is visible of each type that has visible particles, by its place among all types.
     ///
     /// # Errors
@@ -176,7 +62,7 @@ impl Loaded {
     pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
-        self.mark(self.visible(), &mut seen);
+        mark(&self.classes, self.visible(), &mut seen);
         let grids = self.classes.grids.iter();
         let of_type = |kind: usize| {
             let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
@@ -189,7 +75,7 @@ impl Loaded {
 
     /// What a tracer of spheres takes, pass by pass.
     pub fn spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
-        self.passes.iter().enumerate().map(|(i, pass)| Spheres {
+        self.visible.passes().iter().enumerate().map(|(i, pass)| Spheres {
             clip: pass.clip(),
             continues: i > 0,
             ..Spheres::new(&self.classes, pass.visible())
@@ -209,6 +95,20 @@ impl Loaded {
             );
         }
         boxes
+    }
+}
+
+/// Sets `seen`, by index, of the particles that are `visible`.
+pub(crate) fn mark(classes: &RadiusClasses, visible: &[Visibility], seen: &mut [bool]) {
+    for (grid, visible) in classes.grids.iter().zip(visible) {
+        for block in 0..grid.blocks.len() - 1 {
+            let of = visible.block(grid, block);
+            for (i, slot) in grid.particles_of(block).enumerate() {
+                if of.shows(i) {
+                    seen[grid.index(slot) as usize] = true;
+                }
+            }
+        }
     }
 }
 
@@ -258,7 +158,7 @@ pub(crate) fn visibility(
 }
 
 /// Whether colours or what is visible go by the particles' positions.
-fn asks_for_positions(particles: &Particles, system: &System) -> bool {
+pub(crate) fn asks_for_positions(particles: &Particles, system: &System) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {

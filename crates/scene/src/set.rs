@@ -28,28 +28,47 @@ impl Scene {
     /// No such path (the nearest is named) or a value of the wrong type (what was expected is named);
     /// the scene is then as it was.
     pub fn set(&mut self, path: &str, value: &str) -> Result<()> {
-        let names: Vec<&str> = path.split('.').collect();
         let shape = Self::shape();
+        let names: Vec<&str> = path.split('.').collect();
         let leaf = find(&shape, &names).ok_or_else(|| unknown_path(&shape, path))?;
         let wrong = || SceneError::value(path, leaf.expected(), format!("`{}`", quoted(value)));
-        let tree = Value::Table(Table::try_from(&*self).map_err(|_| wrong())?);
         for reading in readings(value) {
-            let mut tree = tree.clone();
-            // A preset is no value beside others: it stands for all of them.
-            if let (["light", "preset"], Value::Table(tree)) = (&names[..], &mut tree) {
-                tree.remove("light");
-                tree.insert("light".into(), Value::Table(Table::new()));
-            }
-            assign(&shape, &mut tree, Target { names: &names, path: "" }, &reading)?;
-            if let Value::Table(tree) = &mut tree {
-                fill_in_preset(tree);
-            }
-            if let Ok(scene) = tree.try_into() {
+            if let Some(scene) = self.with((&shape, &names), Some(&reading))? {
                 *self = scene;
                 return Ok(());
             }
         }
         Err(wrong())
+    }
+
+    /// Sets the parameter at `path`, as [`Scene::set`] finds it, to a value; `None` is its default.
+    ///
+    /// # Errors
+    /// As [`Scene::set`].
+    pub fn put(&mut self, path: &str, value: Option<&Value>) -> Result<()> {
+        let shape = Self::shape();
+        let names: Vec<&str> = path.split('.').collect();
+        let leaf = find(&shape, &names).ok_or_else(|| unknown_path(&shape, path))?;
+        let found = || value.map_or("nothing".into(), |v| quoted(&v.to_string()));
+        let wrong = || SceneError::value(path, leaf.expected(), found());
+        *self = self.with((&shape, &names), value)?.ok_or_else(wrong)?;
+        Ok(())
+    }
+
+    /// The scene with another value at a path that is known to be one of `shape`'s; none if the value is
+    /// of the wrong type.
+    fn with(&self, (shape, names): (&Shape, &[&str]), value: Option<&Value>) -> Result<Option<Self>> {
+        let Ok(tree) = Table::try_from(self) else { return Ok(None) };
+        let mut tree = Value::Table(tree);
+        // A preset is no value beside others: it stands for all of them.
+        if let (["light", "preset"], Value::Table(tree)) = (names, &mut tree) {
+            tree.insert("light".into(), Value::Table(Table::new()));
+        }
+        assign(shape, &mut tree, Target { names, path: "" }, value)?;
+        if let Value::Table(tree) = &mut tree {
+            fill_in_preset(tree);
+        }
+        Ok(tree.try_into().ok())
     }
 }
 
@@ -98,10 +117,13 @@ struct Target<'a> {
     path: &'a str,
 }
 
-/// Puts `new` where `target` points below `value`; the path is known to be one of `shape`'s.
-fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: &Value) -> Result<()> {
+/// Puts `new` where `target` points below `value`, or takes away what is there; the path is known to be
+/// one of `shape`'s.
+fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: Option<&Value>) -> Result<()> {
     let Some((name, rest)) = target.names.split_first() else {
-        *value = new.clone();
+        if let Some(new) = new {
+            *value = new.clone();
+        }
         return Ok(());
     };
     let path = join(target.path, name);
@@ -114,10 +136,19 @@ fn assign(shape: &Shape, value: &mut Value, target: Target<'_>, new: &Value) -> 
                     let expected = format!("an index below {count} (they count from 0)");
                     SceneError::value(target.path, expected, index)
                 })?;
+                if let (Shape::List(_, defaults), None, []) = (shape, new, rest) {
+                    *item = Value::Table(defaults.clone());
+                }
                 assign(of, item, next, new)
             }
             Err(_) => items.iter_mut().try_for_each(|item| assign(of, item, target, new)),
         },
+        (Shape::Map(_), Value::Table(table)) | (Shape::Table(_), Value::Table(table))
+            if new.is_none() && rest.is_empty() =>
+        {
+            table.remove(*name);
+            Ok(())
+        }
         (Shape::Map(of), Value::Table(table)) => {
             assign(of, table.entry(*name).or_insert(Value::Boolean(false)), next, new)
         }
@@ -211,6 +242,34 @@ mod tests {
         assert_eq!(scene.system[0].r#where, "x > 1 && y = 2");
         assert_eq!(scene.system[1].filter[0].max, Some(3.0));
         assert_eq!(scene.image.background, Color::hex(0xff0000));
+    }
+
+    #[test]
+    fn values_are_put_and_taken_away() {
+        let mut scene = with(&["system.color.colors.Na=red", "light.preset=sun", "camera.fov=4"]);
+        let put = |scene: &mut Scene, path: &str, value: Option<Value>| scene.put(path, value.as_ref());
+        put(&mut scene, "camera.fov", Some(Value::Integer(50))).unwrap();
+        put(&mut scene, "camera.position", Some(vec![1.0, 2.0, 3.0].into())).unwrap();
+        put(&mut scene, "system.0.where", Some("Mass > 1".into())).unwrap();
+        put(&mut scene, "light.softness", Some(Value::Float(1.5))).unwrap();
+        assert_eq!((scene.camera.fov, scene.light.softness), (50.0, 1.5));
+        assert_eq!(scene.camera.position, Some(DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!((&*scene.system[0].r#where, &*scene.system[1].r#where), ("Mass > 1", ""));
+        for path in ["camera", "system.0.where", "system.1.color.colors.Na", "light.softness"] {
+            put(&mut scene, path, None).unwrap();
+        }
+        assert_eq!(scene.camera, Scene::default().camera);
+        assert_eq!(scene.light, with(&["light.preset=sun"]).light);
+        assert!(scene.system[0].color.colors.contains_key("Na"));
+        assert!(scene.system[1].color.colors.is_empty());
+        put(&mut scene, "system.0", None).unwrap();
+        assert_eq!(scene.system[0], System::default());
+        let before = scene.clone();
+        let error = put(&mut scene, "camera.fov", Some("wide".into())).unwrap_err().to_string();
+        assert!(error.starts_with("camera.fov: expected a number"), "{error}");
+        assert!(put(&mut scene, "camera.fow", None).unwrap_err().to_string().contains("camera.fov"));
+        assert!(put(&mut scene, "system.7.where", None).is_err());
+        assert_eq!(scene, before);
     }
 
     #[test]

@@ -17,29 +17,41 @@ pub struct Picture {
     pub counts: Counts,
 }
 
-/// Renders a whole picture. `progress` is told of tiles done and tiles in all, from any thread; where it
-/// gives `false` the rest is left out and there is no picture.
+/// Renders a whole picture, as [`Renderer::picture`] does, in memory of its own.
 pub fn render(
     view: View<'_>,
     settings: Settings,
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Option<Picture> {
-    let (width, height) = settings.size;
-    let pixels = width as usize * height as usize;
-    let mut color = vec![[0.0; 4]; pixels];
-    let mut center = vec![Center::NOTHING; if settings.layers { pixels } else { 0 }];
-    // Tiles of one row write to one band.
-    let band = width as usize * AREA as usize;
-    let bands = Bands {
-        width: width as usize,
-        color: color.chunks_mut(band.max(1)).map(Mutex::new).collect(),
-        center: center.chunks_mut(band.max(1)).map(Mutex::new).collect(),
-        done: AtomicU64::new(0),
-        total: Renderer::tiles(settings.size) as u64,
-        progress,
-    };
-    let counts = Renderer::new().render(view, settings, &bands)?;
-    Some(Picture { color, center, counts })
+    Renderer::new().picture(view, settings, progress)
+}
+
+impl Renderer {
+    /// Renders a whole picture. `progress` is told of tiles done and tiles in all, from any thread; where
+    /// it gives `false` the rest is left out and there is no picture.
+    pub fn picture(
+        &self,
+        view: View<'_>,
+        settings: Settings,
+        progress: &(dyn Fn(u64, u64) -> bool + Sync),
+    ) -> Option<Picture> {
+        let (width, height) = settings.size;
+        let pixels = width as usize * height as usize;
+        let mut color = vec![[0.0; 4]; pixels];
+        let mut center = vec![Center::NOTHING; if settings.layers { pixels } else { 0 }];
+        // Tiles of one row write to one band.
+        let band = width as usize * AREA as usize;
+        let bands = Bands {
+            width: width as usize,
+            color: color.chunks_mut(band.max(1)).map(Mutex::new).collect(),
+            center: center.chunks_mut(band.max(1)).map(Mutex::new).collect(),
+            done: AtomicU64::new(0),
+            total: Self::tiles(settings.size) as u64,
+            progress,
+        };
+        let counts = self.render(view, settings, &bands)?;
+        Some(Picture { color, center, counts })
+    }
 }
 
 struct Bands<'a> {

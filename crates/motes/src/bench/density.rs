@@ -22,7 +22,7 @@ use super::table::{Cell, Table};
 use super::{Tables, chosen, hash, median, pool, surface_defaults, timed};
 use crate::density::{masks, optics, params};
 use crate::environment::environment;
-use crate::session::instruction_set;
+use crate::drawing::instruction_set;
 use crate::simulate::Simulated;
 use crate::{Error, Result, Watch, peak_memory_bytes};
 

@@ -12,8 +12,10 @@ use serde::Serialize;
 
 use super::shot::{Shot, Studio};
 use super::{chosen, median, pool, timed};
+use crate::cut::Visible;
+use crate::drawing::instruction_set;
 use crate::radius::{self, Spacing};
-use crate::session::{instruction_set, wanted};
+use crate::session::wanted;
 use crate::system::{Loaded, visibility};
 use crate::{Error, Result, Watch, peak_memory_bytes};
 
@@ -184,7 +186,8 @@ impl Bench {
                 "build" => {
                     let mut times = Vec::new();
                     for _ in 0..self.frames {
-                        let built = self.build(loaded.classes)?;
+                        let spare = Arc::try_unwrap(loaded.classes).unwrap_or_default();
+                        let built = self.build(spare)?;
                         times.push(built.0);
                         loaded = built.1;
                     }
@@ -219,9 +222,11 @@ impl Bench {
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;
-        let paint = crate::paint::Paint::new(particles, system, None)?;
+        let visible = Arc::new(Visible::uncut(&classes, visible));
+        let classes = Arc::new(classes);
+        let paint = Arc::new(crate::paint::Paint::new(particles, system, None)?);
         let particles = Arc::clone(particles);
-        Ok((ms, Loaded::uncut((particles, paint), (classes, visible))))
+        Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
     }
 
     fn origin(&self) -> DVec3 {
@@ -270,7 +275,7 @@ impl Bench {
             ("input", self.particles.bytes()),
             ("data", grids.iter().map(motes_grid::Grid::data_bytes).sum()),
             ("grid", grids.iter().map(motes_grid::Grid::structure_bytes).sum()),
-            ("visibility", loaded.visibility_bytes()),
+            ("visibility", loaded.visible.bytes()),
         ];
         line.bytes.extend(bytes.map(|(name, bytes)| (name, bytes as u64)));
         let counted =

@@ -9,6 +9,7 @@ mod scene;
 mod simulate;
 mod talk;
 mod values;
+mod view;
 
 use std::process::ExitCode;
 
@@ -20,6 +21,7 @@ const EXAMPLES: &str = "\
 Examples:
   motes render -o picture.png                       a picture, without any file
   motes info dump.lammpstrj                         what a file holds
+  motes view dump.lammpstrj                         walk through it in the browser
   motes render dump.lammpstrj -o out.png            a picture of it
   motes render picture.png --size 4k -o large.png   the same picture, larger
   motes scene                                       every parameter there is";
@@ -47,6 +49,8 @@ enum Verb {
     Info(info::Args),
     /// Render a picture of one or more sources
     Render(Box<render::Args>),
+    /// Look at one or more sources in the browser
+    View(Box<view::Args>),
     /// Print the scene: every parameter, its default and its meaning
     Scene(scene::Args),
     /// Simulate a liquid and write its frames
@@ -86,6 +90,7 @@ fn run(cli: Cli) -> Result<(), Failure> {
     match cli.verb {
         Verb::Info(args) => info::run(&args, cli.talk),
         Verb::Render(args) => render::run(&args, cli.talk),
+        Verb::View(args) => view::run(&args, cli.talk),
         Verb::Scene(args) => scene::run(&args),
         Verb::Simulate(args) => simulate::run(&args, cli.talk),
         Verb::Bench(args) => bench::run(&args, cli.talk),

@@ -25,27 +25,43 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
 pub(crate) struct Args {
-    /// Files, quoted patterns, demo:KIND:N, or a picture to draw again
-    #[arg(value_name = "SOURCE")]
-    sources: Vec<String>,
+    #[command(flatten)]
+    given: SceneFlags,
     /// Picture: .png, .exr or .npz; %04d for the frame
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["video", "layers", "stats"])]
     output: Option<String>,
     /// Film of all frames, or of --frame: .mp4
     #[arg(long, value_name = "FILE")]
     video: Option<String>,
+    /// Frame from 0, frames A..B, all or last
+    #[arg(long, value_name = "N|A..B", allow_hyphen_values = true)]
+    frame: Option<Frames>,
+    /// Go around the target in a film
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    turn: Option<String>,
+    /// Threads [default: all]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    threads: Option<usize>,
+    /// Also colour, depth, normal, id: .npz or .exr
+    #[arg(long, value_name = "FILE")]
+    layers: Option<String>,
+    /// Also times, counts and bytes: .json
+    #[arg(long, value_name = "FILE")]
+    stats: Option<String>,
+}
+
+/// What is seen and how: sources, and what becomes parameters of the scene.
+#[derive(Debug, clap::Args)]
+pub(super) struct SceneFlags {
+    /// Files, quoted patterns, demo:KIND:N, or a picture to draw again
+    #[arg(value_name = "SOURCE")]
+    sources: Vec<String>,
     /// Pixels, or 720p, 1080p, 1440p, 4k, 8k
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// The way of seeing: spheres, surface or density
     #[arg(long, value_name = "NAME")]
     renderer: Option<String>,
-    /// Frame from 0, frames A..B, all or last
-    #[arg(long, value_name = "N|A..B", allow_hyphen_values = true)]
-    frame: Option<Frames>,
-    /// Threads [default: all]
-    #[arg(long, value_name = "N", value_parser = threads)]
-    threads: Option<usize>,
     /// Rays per pixel [default: 4]
     #[arg(long, value_name = "N", value_parser = whole)]
     samples: Option<u32>,
@@ -62,12 +78,6 @@ pub(crate) struct Args {
     /// Any parameter that `motes scene` prints
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,
-    /// Also colour, depth, normal, id: .npz or .exr
-    #[arg(long, value_name = "FILE")]
-    layers: Option<String>,
-    /// Also times, counts and bytes: .json
-    #[arg(long, value_name = "FILE")]
-    stats: Option<String>,
 }
 
 /// What becomes a parameter of the scene as it is; the scene knows what each can be.
@@ -78,9 +88,6 @@ struct Look {
     background: Option<String>,
     #[command(flatten)]
     camera: CameraFlags,
-    /// Go around the target in a film
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    turn: Option<String>,
     /// studio, soft, sun, overcast, side, …
     #[arg(long, value_name = "NAME")]
     light: Option<String>,
@@ -277,8 +284,7 @@ fn shots(scene: &Scene, (first, last): (usize, usize)) -> Vec<Shot> {
 impl Args {
     /// Refuses nonsense and makes one scene of everything that was typed.
     fn resolve(&self) -> Result<Plan, Failure> {
-        let mut scene = self.base()?;
-        self.edit(&mut scene)?;
+        let mut scene = self.given.scene(&[("--turn", "camera.turn", &self.turn)])?;
         let film = self.is_film(&scene)?;
         let frames = self.frame.unwrap_or(match film {
             true => Frames::Range(0, None),
@@ -311,11 +317,26 @@ impl Args {
         }
         let moves = scene.camera.moves() || scene.film.frames.is_some();
         let films = moves && self.output.as_ref().is_some_and(|name| numbered(name, 0).is_some());
-        if self.look.turn.is_some() && !films {
+        if self.turn.is_some() && !films {
             let message = "--turn: a film needs --video, or %04d in the name of --output";
             return Err(Failure::usage(message));
         }
         Ok(films)
+    }
+
+}
+
+impl SceneFlags {
+    /// One scene of everything that was typed; `more` are flags of one verb alone.
+    pub fn scene(&self, more: &[Typed<'_>]) -> Result<Scene, Failure> {
+        let mut scene = self.base()?;
+        self.edit(&mut scene, more)?;
+        Ok(scene)
+    }
+
+    /// Whether a size was typed.
+    pub fn has_size(&self) -> bool {
+        self.size.is_some()
     }
 
     /// The scene before flags: a file's, a picture's, or the default with the sources in it.
@@ -343,7 +364,7 @@ impl Args {
     }
 
     /// The one place where flags become parameters: what each flag sets, then `--set` in order.
-    fn edit(&self, scene: &mut Scene) -> Result<(), Failure> {
+    fn edit(&self, scene: &mut Scene, more: &[Typed<'_>]) -> Result<(), Failure> {
         let look = &self.look;
         let [width, height] = match self.size {
             Some([width, height]) => [Some(width.to_string()), Some(height.to_string())],
@@ -358,7 +379,6 @@ impl Args {
             ("--samples", "image.samples", &samples),
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
-            ("--turn", "camera.turn", &look.turn),
             ("--light", "light.preset", &look.light),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
@@ -368,6 +388,7 @@ impl Args {
             ("--where", "system.where", &look.r#where),
         ];
         set_flags(scene, &typed)?;
+        set_flags(scene, more)?;
         set_flags(scene, &look.camera.typed())?;
         self.overlay.edit(scene)?;
         for assignment in &self.set {

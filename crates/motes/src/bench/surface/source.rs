@@ -8,7 +8,7 @@ use motes_surface::Mode;
 use super::fluid::{Drawn, Extracted, Fluid};
 use crate::bench::source::{Line, Source, poses, read};
 use crate::bench::{chosen, median, pool};
-use crate::session::instruction_set;
+use crate::drawing::instruction_set;
 use crate::{Result, Watch, peak_memory_bytes};
 
 /// The stages: boundary extraction, warm; cold extraction and the first frame; frames of a turning camera,

@@ -1,0 +1,148 @@
+//! The picture of what was loaded, by the scene's way of seeing.
+
+use fearless_simd::Level;
+use glam::{DVec3, Vec3};
+use motes_frame::{Frame, Layer};
+use motes_scene::{Bounds, Renderer, Resolved, Scene};
+use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
+use motes_surface::MOST_MEDIA;
+
+use crate::density::Cast;
+use crate::entries::Entries;
+use crate::liquid::{Liquid, Matter, Opened};
+use crate::nearest::Nearest;
+use crate::scenery::Others;
+use crate::stats::Stats;
+use crate::system::Loaded;
+use crate::{Error, Result, Watch};
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub(crate) struct Drawing<'a> {
+    pub scene: &'a Scene,
+    pub loaded: &'a [Loaded],
+    pub resolved: &'a Resolved,
+    /// The point that positions are about.
+    pub origin: DVec3,
+    /// All that is visible, in world coordinates.
+    pub bounds: Option<Bounds>,
+    /// The renderer of spheres, with its memory.
+    pub renderer: &'a motes_spheres::Renderer,
+}
+
+impl Drawing<'_> {
+    /// The picture, with `layers` or without.
+    ///
+    /// # Errors
+    /// The surroundings cannot be read, or the watch cancels.
+    pub fn draw(&self, layers: bool, watched: (&mut Stats, &dyn Watch)) -> Result<Frame> {
+        match self.scene.renderer {
+            Renderer::Spheres => self.trace(layers, watched),
+            Renderer::Surface | Renderer::Density => self.flow(layers, watched),
+        }
+    }
+
+    /// The first system as a liquid, the others as spheres before it and in it.
+    fn flow(&self, layers: bool, (stats, watch): (&mut Stats, &dyn Watch)) -> Result<Frame> {
+        let Self { scene, loaded, resolved, origin, bounds, .. } = *self;
+        let [system, others @ ..] = loaded else {
+            let name = if scene.renderer == Renderer::Density { "density" } else { "surface" };
+            return Err(Error::Usage(format!("renderer {name}: no system is visible")));
+        };
+        let level = Level::new();
+        stats.simd = instruction_set(level).into();
+        let entries = Entries::new(others);
+        let boxes = others.iter().flat_map(|l| l.boxes(origin));
+        let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let corners = boxes.fold(nothing, |[low, high], b| {
+            [low.min((b.min - origin).as_vec3()), high.max((b.max - origin).as_vec3())]
+        });
+        let others = Others { systems: &entries.spheres, paint: &entries, bounds: corners };
+        let others = (!entries.spheres.is_empty()).then_some(others);
+        if scene.renderer == Renderer::Density {
+            let cast = Cast { scene, system, resolved, bounds, origin, level, others };
+            return cast.draw(layers, (stats, watch));
+        }
+        let matter = Matter::of(system);
+        let types = match scene.surface.media {
+            motes_scene::surface::Media::One => Vec::new(),
+            motes_scene::surface::Media::Types => system.visible_by_type()?,
+        };
+        if types.len() > MOST_MEDIA {
+            return Err(Error::Usage(format!(
+                "surface.media = types: {} types are visible, expected at most {MOST_MEDIA}",
+                types.len()
+            )));
+        }
+        let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
+        let media = &media[..];
+        let nearest = system.clip().map(|_| Nearest::new(system));
+        let opened = Opened::of(system, &nearest);
+        let liquid =
+            Liquid { scene, matter, media, resolved, bounds, origin, level, others, opened };
+        liquid.draw(layers, stats)
+    }
+
+    fn trace(&self, layers: bool, (stats, watch): (&mut Stats, &dyn Watch)) -> Result<Frame> {
+        let Self { loaded, resolved, origin, .. } = *self;
+        let level = Level::new();
+        stats.simd = instruction_set(level).into();
+        let entries = Entries::new(loaded);
+        let rays = resolved.view.rays(origin);
+        let lights = resolved.lights.about(origin);
+        let systems = &entries.spheres;
+        let view = View { rays: &rays, systems, paint: &entries, lights: &lights };
+        let image = &self.scene.image;
+        let settings = Settings {
+            size: (image.width, image.height),
+            samples: image.samples,
+            primary: match self.scene.spheres.primary {
+                motes_scene::Primary::Project => Primary::Project,
+                motes_scene::Primary::Trace => Primary::Trace,
+            },
+            packet: self.scene.spheres.packet,
+            layers,
+            finer: Finer {
+                adaptive: Some(Adaptive {
+                    most: image.max_samples,
+                    noise: image.noise as f32,
+                    exposure: image.exposure.exp2() as f32,
+                }),
+                lens: resolved.view.lens,
+            },
+            level,
+        };
+        let tell = |done, total| watch.progress("render", done, total);
+        let traced = self.renderer.picture(view, settings, &tell).ok_or(Error::Cancelled)?;
+        stats.counts.insert("tests", traced.counts.tests);
+        stats.counts.insert("spheres", traced.counts.spheres);
+        let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
+        if layers { with_layers(frame, &traced.center, &entries) } else { Ok(frame) }
+    }
+}
+
+fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
+    // Where nothing is, the system is 0.
+    let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
+    Ok(frame
+        .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
+        .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
+        .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
+        .with(Layer::System(center.iter().map(system).collect()))?)
+}
+
+/// The name of an instruction set.
+pub(crate) fn instruction_set(level: Level) -> &'static str {
+    match level {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512(_) => "AVX-512",
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2(_) => "AVX2",
+        // Nothing is compiled for SSE4.2 alone.
+        #[cfg(target_arch = "x86_64")]
+        Level::Sse4_2(_) | Level::Sse2(_) => "SSE2",
+        #[cfg(target_arch = "aarch64")]
+        Level::Neon(_) => "NEON",
+        _ => "scalar",
+    }
+}

@@ -1,0 +1,128 @@
+//! The command line that makes the very picture that is shown, and its scene as text.
+
+use motes_scene::{Scene, Setting, Shape};
+use toml::{Table, Value};
+
+use crate::session::make_absolute;
+
+/// What differs from the defaults, as TOML.
+pub(super) fn scene_text(scene: &Scene) -> String {
+    let mut scene = scene.clone();
+    scene.system.iter_mut().for_each(|system| make_absolute(&mut system.source));
+    let own = Table::try_from(&scene).unwrap_or_default();
+    let defaults = Table::try_from(Scene::default()).unwrap_or_default();
+    let table = differences(&own, &defaults, &Scene::shape());
+    toml::to_string(&table).unwrap_or_default()
+}
+
+/// The fields of a table that are not as by default; lists whole, their items without defaults.
+fn differences(own: &Table, defaults: &Table, shape: &Shape) -> Table {
+    let Shape::Table(fields) = shape else { return own.clone() };
+    let mut out = Table::new();
+    for field in fields {
+        let Some(value) = own.get(field.name) else { continue };
+        let default = defaults.get(field.name);
+        if default == Some(value) {
+            continue;
+        }
+        let value = match (&field.shape, value, default) {
+            (Shape::Table(_), Value::Table(own), Some(Value::Table(defaults))) => {
+                Value::Table(differences(own, defaults, &field.shape))
+            }
+            (Shape::List(of, defaults), Value::Array(items), _) => {
+                let item = |item: &Value| match item {
+                    Value::Table(own) => Value::Table(differences(own, defaults, of)),
+                    other => other.clone(),
+                };
+                Value::Array(items.iter().map(item).collect())
+            }
+            _ => value.clone(),
+        };
+        out.insert(field.name.into(), value);
+    }
+    out
+}
+
+/// `motes render …` for the picture that is shown.
+pub(super) fn command(scene: &Scene) -> String {
+    let mut words = vec!["motes".to_owned(), "render".to_owned()];
+    words.extend(scene.system.iter().map(|system| quoted(&system.source)));
+    words.extend(["-o".into(), "picture.png".into()]);
+    words.push(format!("--size {}x{}", scene.image.width, scene.image.height));
+    let mut scene = scene.clone();
+    scene.system.iter_mut().for_each(|system| system.source.clear());
+    (scene.image.width, scene.image.height) = {
+        let image = motes_scene::Image::default();
+        (image.width, image.height)
+    };
+    let own = Table::try_from(&scene).unwrap_or_default();
+    let mut defaults = Scene::default();
+    let one = defaults.system.first().cloned().unwrap_or_default();
+    defaults.system.resize(scene.system.len(), one);
+    // A preset is what the rest of the light is compared with.
+    defaults.light = motes_scene::Light::of(scene.light.preset);
+    let preset = Value::try_from(scene.light.preset).ok();
+    if defaults.light != Scene::default().light
+        && let Some(preset) = preset
+    {
+        words.push(set("light.preset", &preset));
+    }
+    let defaults = Table::try_from(&defaults).unwrap_or_default();
+    let root = (&Scene::shape(), Value::Table(own), Some(Value::Table(defaults)));
+    settings(&mut words, "", root);
+    words.join(" ")
+}
+
+/// `--set` for everything below `path` that is not as by default.
+fn settings(out: &mut Vec<String>, path: &str, (shape, own, default): (&Shape, Value, Option<Value>)) {
+    if default.as_ref() == Some(&own) {
+        return;
+    }
+    let below = |name: &str| if path.is_empty() { name.into() } else { format!("{path}.{name}") };
+    match (shape, own, default) {
+        (Shape::Table(fields), Value::Table(mut own), Some(Value::Table(mut default))) => {
+            for field in fields {
+                if let Some(value) = own.remove(field.name) {
+                    let of = (&field.shape, value, default.remove(field.name));
+                    settings(out, &below(field.name), of);
+                }
+            }
+        }
+        (Shape::List(of, _), Value::Array(own), Some(Value::Array(default)))
+            if own.len() == default.len() =>
+        {
+            for (i, (own, default)) in own.into_iter().zip(default).enumerate() {
+                settings(out, &below(&i.to_string()), (of, own, Some(default)));
+            }
+        }
+        (_, own, _) => out.push(set(path, &own)),
+    }
+}
+
+fn set(path: &str, value: &Value) -> String {
+    format!("--set {}", quoted(&format!("{path}={}", inline(value))))
+}
+
+/// A value on one line, as TOML has it.
+fn inline(value: &Value) -> String {
+    value.to_string()
+}
+
+/// A word for a shell.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,+@".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.into();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// Whether two sources are the same, however their paths are written.
+pub(super) fn same_source(a: &str, b: &str) -> bool {
+    let absolute = |source: &str| {
+        let mut source = source.to_owned();
+        make_absolute(&mut source);
+        source
+    };
+    absolute(a) == absolute(b)
+}

@@ -1,0 +1,73 @@
+//! The page: the files of `page/`, in the program.
+
+/// A file of the page.
+pub(crate) struct Asset {
+    /// Its name in the folder.
+    pub name: &'static str,
+    pub bytes: &'static [u8],
+}
+
+macro_rules! assets {
+    ($($name:literal,)*) => {
+        &[$(Asset { name: $name, bytes: include_bytes!(concat!("../page/", $name)) },)*]
+    };
+}
+
+/// All of them; a test compares this list with the folder.
+const ASSETS: &[Asset] = assets![
+    "index.html",
+];
+
+/// The file called `name`.
+pub(crate) fn asset(name: &str) -> Option<&'static Asset> {
+    ASSETS.iter().find(|asset| asset.name == name)
+}
+
+impl Asset {
+    /// Its media type.
+    pub fn media(&self) -> &'static str {
+        match self.name.rsplit_once('.').map_or("", |(_, end)| end) {
+            "html" => "text/html; charset=utf-8",
+            "js" | "mjs" => "text/javascript; charset=utf-8",
+            "css" => "text/css; charset=utf-8",
+            "svg" => "image/svg+xml",
+            "json" | "webmanifest" => "application/json",
+            "png" => "image/png",
+            _ => "application/octet-stream",
+        }
+    }
+
+    /// A word that changes with its content.
+    pub fn version(&self) -> String {
+        // Fowler, Noll & Vo's hash, 64 bits.
+        let of = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        format!("\"{:016x}\"", self.bytes.iter().fold(0xcbf2_9ce4_8422_2325, of))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_is_the_folder() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
+        let mut there: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        there.sort();
+        let mut listed: Vec<_> = ASSETS.iter().map(|asset| asset.name.to_owned()).collect();
+        listed.sort();
+        assert_eq!(listed, there);
+    }
+
+    #[test]
+    fn files_have_types_and_versions() {
+        let index = asset("index.html").unwrap();
+        assert!(index.media().starts_with("text/html"));
+        assert_eq!(index.version(), index.version());
+        assert_ne!(index.version(), Asset { name: "a", bytes: b"a" }.version());
+        assert!(ASSETS.iter().all(|a| a.media() != "application/octet-stream"));
+    }
+}
