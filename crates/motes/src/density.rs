@@ -1,6 +1,8 @@
 //! A system of particles seen as a liquid by a field of voxels: from the scene's parameters to the density
 //! renderer's, and from its picture to a frame.
 
+use std::convert::Infallible;
+use std::sync::Arc;
 use std::time::Instant;
 
 use fearless_simd::Level;
@@ -15,6 +17,8 @@ use motes_particles::read::names;
 use motes_scene::{Beyond, Bounds, Environment, Lights, Resolved, Scene};
 
 use crate::environment::{FLOOR_FILL, WATER, environment};
+use crate::cut::Visible;
+use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
@@ -37,16 +41,14 @@ impl Cloud {
     /// The visible particles of a system; with masks, if these are asked for: its own, or made here.
     fn of(system: &Loaded, masked: bool) -> Self {
         let mut cloud = Self::default();
-        let mut sum = 0.0;
         for (grid, visible) in system.classes.grids.iter().zip(system.visible()) {
             visit(grid, visible, |slot| {
                 cloud.positions.push(grid.center(slot).to_array());
                 cloud.radii.push(grid.radius_at(slot));
                 cloud.indices.push(grid.index(slot));
-                sum += f64::from(grid.radius_at(slot));
             });
         }
-        cloud.mean_radius = sum / cloud.positions.len().max(1) as f64;
+        cloud.mean_radius = mean_radius(system);
         if masked && !cloud.positions.is_empty() {
             let own = system.particles.column(names::PARTICLE_MASK);
             // Those of a file count all of its particles.
@@ -71,6 +73,18 @@ impl Cloud {
         };
         Particles { positions: &self.positions, radii, masks: self.masks.as_deref() }
     }
+}
+
+/// The mean radius of the visible particles; 0 without any.
+fn mean_radius(system: &Loaded) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for (grid, visible) in system.classes.grids.iter().zip(system.visible()) {
+        visit(grid, visible, |slot| {
+            sum += f64::from(grid.radius_at(slot));
+            count += 1;
+        });
+    }
+    sum / count.max(1) as f64
 }
 
 /// Calls `visit` for the slot of each visible particle.
@@ -126,6 +140,26 @@ pub(crate) fn optics(scene: &Scene, bounds: Bounds) -> Optics {
     Optics { ior: d.ior as f32, absorption, depth: d.depth }
 }
 
+/// A field, and what it was made of.
+pub(crate) struct Made {
+    cloud: Cloud,
+    field: Field,
+    space: Space,
+}
+
+/// Fields from one picture to the next.
+pub(crate) struct Fields {
+    /// By what is visible, how it is made, and whether with masks.
+    made: Memo<(Same<Visible>, Params, bool), Made>,
+    mean_radii: Memo<Same<Visible>, f64>,
+}
+
+impl Default for Fields {
+    fn default() -> Self {
+        Self { made: Memo::new(1), mean_radii: Memo::new(1) }
+    }
+}
+
 /// What a liquid is drawn from.
 #[derive(Clone, Copy)]
 pub(crate) struct Cast<'a> {
@@ -139,6 +173,7 @@ pub(crate) struct Cast<'a> {
     pub level: Level,
     /// What stands before the liquid and in it.
     pub others: Option<Others<'a>>,
+    pub fields: &'a Fields,
 }
 
 impl Cast<'_> {
@@ -147,12 +182,11 @@ impl Cast<'_> {
     /// # Errors
     /// The environment cannot be read, or the watch cancels.
     pub fn draw(&self, with: bool, (stats, watch): (&mut Stats, &dyn Watch)) -> Result<Frame> {
-        let cloud = Cloud::of(self.system, self.scene.density.mask);
-        let seen = self.bounds.filter(|_| !cloud.positions.is_empty());
         let view = self.view();
-        let Some(bounds) = seen else {
+        let Some(bounds) = self.bounds.filter(|_| self.system.count_visible() > 0) else {
             let empty = vec![[0.0; 4]; view.pixels()];
             let frame = Frame::new(view.size.0 as usize, view.size.1 as usize, empty)?;
+            let cloud = Cloud::default();
             return if with { self.with_layers(frame, (&[], &cloud)) } else { Ok(frame) };
         };
         let stage = |done: u64| match watch.progress("density", done, 3) {
@@ -165,11 +199,11 @@ impl Cast<'_> {
             (self.scene, self.resolved),
             (bounds, self.origin),
         )?;
-        let (mut field, mut space) = (Field::default(), Space::default());
-        self.fill((&mut field, &mut space), (&cloud, bounds), stats);
+        let made = self.made(bounds, stats);
+        let Made { cloud, field, space } = &*made;
         stage(1)?;
         let clip = self.system.clip();
-        let liquid = Liquid { field: &field, space: &space, clip, level: self.level };
+        let liquid = Liquid { field, space, clip, level: self.level };
         let setting = (environment, optics(self.scene, bounds));
         let color = self.shade((&liquid, &view), &setting, stats);
         stage(2)?;
@@ -177,38 +211,45 @@ impl Cast<'_> {
         if !with {
             return Ok(frame);
         }
-        let frame = self.with_layers(frame, (&layers(&liquid, &view), &cloud));
+        let frame = self.with_layers(frame, (&layers(&liquid, &view), cloud));
         stage(3)?;
         frame
+    }
+
+    /// The field of what is visible, made now if it is not the last one.
+    fn made(&self, bounds: Bounds, stats: &mut Stats) -> Arc<Made> {
+        let longest = (bounds.max - bounds.min).max_element();
+        let masked = self.scene.density.mask;
+        let visible = || Same(self.system.visible.clone());
+        let mean_radius = || Ok::<_, Infallible>(mean_radius(self.system));
+        let Ok(mean_radius) = self.fields.mean_radii.get(visible(), mean_radius);
+        let params = params(self.scene, (*mean_radius, longest));
+        let (start, mut space_ms) = (Instant::now(), 0.0);
+        let made: std::result::Result<_, Infallible> =
+            self.fields.made.get((visible(), params, masked), || {
+                let cloud = Cloud::of(self.system, masked);
+                let (mut field, mut space) = (Field::default(), Space::default());
+                field.fill(&cloud.particles(), &params, self.level);
+                let start = Instant::now();
+                space.fill(&field, (&cloud.particles(), &params), self.level);
+                space_ms = milliseconds(start);
+                Ok(Made { cloud, field, space })
+            });
+        let Ok(made) = made;
+        stats.ms.insert("field", milliseconds(start) - space_ms);
+        stats.ms.insert("space", space_ms);
+        stats.bytes.extend([("field", made.field.bytes()), ("space", made.space.bytes())]);
+        stats.particles.insert("drops", made.space.drop_count());
+        let voxels: usize = made.field.lattice.dims.iter().product();
+        stats.counts.insert("voxels", voxels as u64);
+        let coarser = made.field.lattice.voxel > params.voxel;
+        stats.counts.insert("voxels_coarsened", u64::from(coarser));
+        made
     }
 
     fn view(&self) -> View {
         let image = &self.scene.image;
         View { rays: self.resolved.view.rays(self.origin), size: (image.width, image.height) }
-    }
-
-    /// Makes the field, and finds what rays can skip in it.
-    fn fill(
-        &self,
-        (field, space): (&mut Field, &mut Space),
-        (cloud, bounds): (&Cloud, Bounds),
-        stats: &mut Stats,
-    ) {
-        let longest = (bounds.max - bounds.min).max_element();
-        let params = params(self.scene, (cloud.mean_radius, longest));
-        let particles = cloud.particles();
-        let start = Instant::now();
-        field.fill(&particles, &params, self.level);
-        stats.ms.insert("field", milliseconds(start));
-        let start = Instant::now();
-        space.fill(field, (&particles, &params), self.level);
-        stats.ms.insert("space", milliseconds(start));
-        stats.bytes.extend([("field", field.bytes()), ("space", space.bytes())]);
-        stats.particles.insert("drops", space.drop_count());
-        let voxels: usize = field.lattice.dims.iter().product();
-        stats.counts.insert("voxels", voxels as u64);
-        let coarser = field.lattice.voxel > params.voxel;
-        stats.counts.insert("voxels_coarsened", u64::from(coarser));
     }
 
     fn shade(

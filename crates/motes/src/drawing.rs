@@ -1,5 +1,7 @@
 //! The picture of what was loaded, by the scene's way of seeing.
 
+use std::sync::Arc;
+
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
@@ -7,9 +9,11 @@ use motes_scene::{Bounds, Renderer, Resolved, Scene};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 
-use crate::density::Cast;
+use crate::cut::Visible;
+use crate::density::{Cast, Fields};
 use crate::entries::Entries;
-use crate::liquid::{Liquid, Matter, Opened};
+use crate::liquid::{Boundaries, Liquid, Matter, Opened};
+use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
 use crate::scenery::Others;
 use crate::stats::Stats;
@@ -26,8 +30,28 @@ pub(crate) struct Drawing<'a> {
     pub origin: DVec3,
     /// All that is visible, in world coordinates.
     pub bounds: Option<Bounds>,
+    pub kept: &'a Kept,
+}
+
+/// What is kept from one picture to the next.
+pub(crate) struct Kept {
     /// The renderer of spheres, with its memory.
-    pub renderer: &'a motes_spheres::Renderer,
+    renderer: motes_spheres::Renderer,
+    boundaries: Boundaries,
+    fields: Fields,
+    media: Memo<Same<Visible>, Vec<(usize, Arc<Visible>)>>,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Self {
+            renderer: motes_spheres::Renderer::new(),
+            // Several liquids, and all of them as one.
+            boundaries: Memo::new(MOST_MEDIA + 1),
+            fields: Fields::default(),
+            media: Memo::new(1),
+        }
+    }
 }
 
 impl Drawing<'_> {
@@ -60,13 +84,16 @@ impl Drawing<'_> {
         let others = Others { systems: &entries.spheres, paint: &entries, bounds: corners };
         let others = (!entries.spheres.is_empty()).then_some(others);
         if scene.renderer == Renderer::Density {
-            let cast = Cast { scene, system, resolved, bounds, origin, level, others };
+            let fields = &self.kept.fields;
+            let cast = Cast { scene, system, resolved, bounds, origin, level, others, fields };
             return cast.draw(layers, (stats, watch));
         }
         let matter = Matter::of(system);
         let types = match scene.surface.media {
-            motes_scene::surface::Media::One => Vec::new(),
-            motes_scene::surface::Media::Types => system.visible_by_type()?,
+            motes_scene::surface::Media::One => Arc::default(),
+            motes_scene::surface::Media::Types => {
+                self.kept.media.get(Same(system.visible.clone()), || system.visible_by_type())?
+            }
         };
         if types.len() > MOST_MEDIA {
             return Err(Error::Usage(format!(
@@ -77,10 +104,19 @@ impl Drawing<'_> {
         let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
         let media = &media[..];
         let nearest = system.clip().map(|_| Nearest::new(system));
-        let opened = Opened::of(system, &nearest);
-        let liquid =
-            Liquid { scene, matter, media, resolved, bounds, origin, level, others, opened };
-        liquid.draw(layers, stats)
+        let liquid = Liquid {
+            scene,
+            matter,
+            media,
+            resolved,
+            bounds,
+            origin,
+            level,
+            others,
+            opened: Opened::of(system, &nearest),
+            boundaries: Some(&self.kept.boundaries),
+        };
+        liquid.draw(layers, (stats, watch))
     }
 
     fn trace(&self, layers: bool, (stats, watch): (&mut Stats, &dyn Watch)) -> Result<Frame> {
@@ -113,7 +149,7 @@ impl Drawing<'_> {
             level,
         };
         let tell = |done, total| watch.progress("render", done, total);
-        let traced = self.renderer.picture(view, settings, &tell).ok_or(Error::Cancelled)?;
+        let traced = self.kept.renderer.picture(view, settings, &tell).ok_or(Error::Cancelled)?;
         stats.counts.insert("tests", traced.counts.tests);
         stats.counts.insert("spheres", traced.counts.spheres);
         let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;

@@ -21,6 +21,7 @@ mod environment;
 mod error;
 mod info;
 mod liquid;
+mod memo;
 mod nearest;
 mod opacity;
 mod open;

@@ -2,6 +2,8 @@
 //! picture to a frame.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::Arc;
 use std::time::Instant;
 
 use fearless_simd::Level;
@@ -16,14 +18,16 @@ use motes_surface::{
     connect, filter, normals, shade_finer, splat, voxelize,
 };
 
-use crate::Result;
 use crate::environment::{FLOOR_FILL, WATER, environment};
+use crate::cut::Visible;
+use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
 use crate::paint;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
 use crate::system::Loaded;
+use crate::{Error, Result, Watch};
 
 /// Up to so many particles, balls are fitted to the surface by themselves: of more, each is but a few pixels wide.
 const FIT_AUTO: usize = 500_000;
@@ -36,6 +40,8 @@ const SHADOW_ROWS: u32 = 1024;
 #[derive(Clone, Copy)]
 pub(crate) struct Matter<'a> {
     pub particles: Particles<'a>,
+    /// What they are of; none where they are not of a system's grids.
+    pub identity: Option<&'a Arc<Visible>>,
     /// How many of them are visible.
     pub visible: usize,
     pub mean_radius: f64,
@@ -56,6 +62,7 @@ impl<'a> Matter<'a> {
         let greatest = grids.iter().map(|g| g.greatest_radius).fold(0.0, f32::max);
         Self {
             particles: Particles::Grids(grids, system.visible()),
+            identity: Some(&system.visible),
             visible: system.count_visible(),
             mean_radius: sum / count.max(1) as f64,
             greatest_radius: f64::from(greatest),
@@ -67,9 +74,11 @@ impl<'a> Matter<'a> {
 
 impl<'a> Matter<'a> {
     /// The same of fewer particles of its system.
-    pub fn only(self, system: &'a Loaded, visible: &'a [Visibility]) -> Self {
-        let particles = Particles::Grids(&system.classes.grids, visible);
-        Self { particles, visible: visible.iter().map(Visibility::visible).sum(), ..self }
+    pub fn only(self, system: &'a Loaded, visible: &'a Arc<Visible>) -> Self {
+        let particles = Particles::Grids(&system.classes.grids, visible.all());
+        let identity = Some(visible);
+        let visible = visible.all().iter().map(Visibility::visible).sum();
+        Self { particles, identity, visible, ..self }
     }
 }
 
@@ -79,6 +88,9 @@ pub(crate) struct Setting {
     lights: Lights,
     shadow: Option<Shadow>,
 }
+
+/// Boundaries of liquids from one picture to the next, by what is visible and how spans are made.
+pub(crate) type Boundaries = Memo<(Same<Visible>, Params, f64), Boundary>;
 
 /// What a liquid is drawn from.
 #[derive(Clone, Copy)]
@@ -97,6 +109,7 @@ pub(crate) struct Liquid<'a> {
     pub others: Option<Others<'a>>,
     /// Where it is cut open.
     pub opened: Option<Opened<'a>>,
+    pub boundaries: Option<&'a Boundaries>,
 }
 
 /// Cuts of a liquid, and where its particles are.
@@ -118,15 +131,21 @@ impl Liquid<'_> {
     ///
     /// # Errors
     /// The environment cannot be read.
-    pub fn draw(&self, layers: bool, stats: &mut Stats) -> Result<Frame> {
+    pub fn draw(&self, layers: bool, (stats, watch): (&mut Stats, &dyn Watch)) -> Result<Frame> {
         let image = &self.scene.image;
         let size = (image.width, image.height);
         let finer = self.finer();
         let Some(bounds) = self.bounds.filter(|_| self.matter.visible > 0) else {
             return self.nothing(layers);
         };
+        let go_on = |done: u64| match watch.progress("surface", done, 4) {
+            true => Ok(()),
+            false => Err(Error::Cancelled),
+        };
+        go_on(0)?;
         let params = self.params(layers || self.painted());
         let boundary = self.boundary(&params, stats);
+        go_on(1)?;
         let optics = self.optics(bounds);
         let setting = self.setting(bounds, (&boundary, &optics), stats)?;
         let view = self.view(bounds, finer);
@@ -139,11 +158,13 @@ impl Liquid<'_> {
         if media.is_empty() {
             media.push((self.surfaces((&boundary, &params), view, stats), self.ior()));
         }
+        go_on(2)?;
         let color = self.shade(&media, (&optics, &setting), stats);
         let frame = Frame::new(size.0 as usize, size.1 as usize, color)?;
         if !layers {
             return Ok(frame);
         }
+        go_on(3)?;
         // Of the whole liquid, along a pixel's own ray, which is through its centre.
         let centers = match (&mut media[..], finer) {
             ([_], 1) => media.remove(0).0,
@@ -163,11 +184,16 @@ impl Liquid<'_> {
     }
 
     /// What has to be drawn, whatever the view.
-    pub fn boundary(&self, params: &Params, stats: &mut Stats) -> Boundary {
+    pub fn boundary(&self, params: &Params, stats: &mut Stats) -> Arc<Boundary> {
         let start = Instant::now();
-        let radius_scale = self.scene.surface.ball as f32;
-        let input = Input { particles: self.matter.particles, radius_scale };
-        let boundary = Boundary::extract(&input, params, self.level);
+        let ball = self.scene.surface.ball;
+        let input = Input { particles: self.matter.particles, radius_scale: ball as f32 };
+        let extract = || Ok(Boundary::extract(&input, params, self.level));
+        let boundary: std::result::Result<_, Infallible> = match (self.boundaries, self.matter.identity) {
+            (Some(kept), Some(of)) => kept.get((Same(of.clone()), *params, ball), extract),
+            _ => extract().map(Arc::new),
+        };
+        let Ok(boundary) = boundary;
         stats.ms.insert("boundary", milliseconds(start));
         let counts = boundary.counts;
         stats.particles.insert("splatted", counts.kept);

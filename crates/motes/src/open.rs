@@ -44,6 +44,11 @@ pub fn open_with(source: &str, sph: &Sph) -> Result<Series> {
     Ok(Series::from_reader(format, reader))
 }
 
+/// Whether a source is made up here, and no file.
+pub(crate) fn is_made(source: &str) -> bool {
+    source.starts_with("demo:") || source.starts_with("sim:")
+}
+
 /// The scene of [`BUILT_IN`]: an antibody upright, its arms spread before the eye, its chains told
 /// apart by colour.
 pub fn built_in_scene() -> Scene {

@@ -13,7 +13,8 @@ use motes_scene::{
 
 use crate::annotate::{Annotated, annotations};
 use crate::cut::Visible;
-use crate::drawing::Drawing;
+use crate::drawing::{Drawing, Kept};
+use crate::memo::Same;
 use crate::opacity::ALPHA;
 use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
@@ -44,6 +45,29 @@ impl From<usize> for Shot {
     /// A frame, before a camera that stands.
     fn from(frame: usize) -> Self {
         Self { frame, moment: None }
+    }
+}
+
+/// Seconds of a film of a single frame, where nothing else is said.
+const STILL_SECONDS: f64 = 8.0;
+
+impl Shot {
+    /// The pictures of a film of some frames, as many as the scene says.
+    pub fn film(scene: &Scene, frames: std::ops::RangeInclusive<usize>) -> Vec<Self> {
+        let (first, last) = (*frames.start(), *frames.end());
+        let frames = (last + 1).saturating_sub(first);
+        let pictures = match scene.film.frames {
+            Some(pictures) => pictures as usize,
+            None if frames == 1 && scene.camera.moves() => {
+                (STILL_SECONDS * scene.film.fps).ceil() as usize
+            }
+            None => frames,
+        };
+        let shot = |picture| Self {
+            frame: first + picture * frames / pictures,
+            moment: Some(Moment { picture, pictures }),
+        };
+        (0..pictures).map(shot).collect()
     }
 }
 
@@ -86,7 +110,7 @@ pub struct Session {
     stages: Vec<Stages>,
     /// Boxes around what is to be framed, and what they are around.
     framed: Option<(Vec<Framed>, Arc<Vec<Bounds>>)>,
-    renderer: motes_spheres::Renderer,
+    kept: Kept,
     /// Whether the view was held for several frames.
     film: bool,
     /// Colour range per system over its whole series, once it was asked for, and of what.
@@ -121,7 +145,7 @@ impl Session {
             pool: None,
             stages: series.iter().map(|_| Stages::default()).collect(),
             framed: None,
-            renderer: motes_spheres::Renderer::new(),
+            kept: Kept::default(),
             film: false,
             ranges: vec![None; series.len()],
             all_columns: false,
@@ -154,6 +178,24 @@ impl Session {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Opens the sources again, for all who share them, as files may have grown; gives how many frames
+    /// there are.
+    ///
+    /// # Errors
+    /// A source cannot be read; it is then as it was.
+    pub(crate) fn refresh(&self) -> Result<usize> {
+        let mut most = 0;
+        for (system, series) in self.scene.system.iter().zip(&self.series) {
+            if crate::open::is_made(&system.source) {
+                continue;
+            }
+            let mut anew = crate::open_with(&system.source, &self.scene.sph)?;
+            most = most.max(anew.frames(&|_, _| {})?);
+            *lock(series) = anew;
+        }
+        Ok(most)
     }
 
     /// How many frames there are: those of the longest series.
@@ -243,13 +285,13 @@ impl Session {
     /// As [`Session::render`].
     pub(crate) fn look(&mut self, frame: usize, hashed: bool, watch: &dyn Watch) -> Result<Look> {
         let drawn = self.draw((frame.into(), After::Kept), Layers::No, watch)?;
-        let Drawn { raw, mut stats, loaded, resolved, boxes, .. } = drawn;
+        let Drawn { raw, mut stats, loaded, resolved, boxes, origin, .. } = drawn;
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
         let annotated = Annotated { systems: &loaded, frame, film: self.film };
         let shown = self.finish(raw, &resolved, &annotated);
         stats.ms.insert("finish", milliseconds(start));
-        Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, frame } })
+        Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, origin } })
     }
 
     /// What there is to be seen of the scene's frame, before anything is drawn.
@@ -262,7 +304,7 @@ impl Session {
         let (loaded, origin) = self.load(particles)?;
         let boxes = self.framed(&loaded, origin);
         let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
-        Ok(Seen { loaded, resolved, boxes, frame })
+        Ok(Seen { loaded, resolved, boxes, origin })
     }
 
     /// The picture without tone and what is drawn over it.
@@ -296,12 +338,12 @@ impl Session {
             resolved: &resolved,
             origin,
             bounds: boxes.iter().copied().reduce(Bounds::union),
-            renderer: &self.renderer,
+            kept: &self.kept,
         };
         let raw = drawing.draw(layers, (&mut stats, watch))?;
         stats.ms.insert("trace", milliseconds(start));
         count(&mut stats, &loaded);
-        Ok(Drawn { raw, stats, scene, resolved, loaded, boxes })
+        Ok(Drawn { raw, stats, scene, resolved, loaded, boxes, origin })
     }
 
     fn note_left_out(&mut self, loaded: &[Loaded], frame: usize) {
@@ -494,6 +536,7 @@ struct Drawn {
     resolved: Resolved,
     loaded: Vec<Loaded>,
     boxes: Arc<Vec<Bounds>>,
+    origin: DVec3,
 }
 
 /// A finished picture, and what it is of.
@@ -511,26 +554,17 @@ pub(crate) struct Seen {
     pub loaded: Vec<Loaded>,
     pub resolved: Resolved,
     pub boxes: Arc<Vec<Bounds>>,
-    pub frame: usize,
+    /// The point that positions in grids are about.
+    pub origin: DVec3,
 }
 
-/// What boxes were made around.
-struct Framed {
-    visible: Arc<Visible>,
-    sim_box: Option<SimulationBox>,
-    origin: DVec3,
-}
+/// What boxes are made around.
+#[derive(PartialEq)]
+struct Framed(Same<Visible>, Option<SimulationBox>, DVec3);
 
 impl Framed {
     fn of(loaded: &Loaded, origin: DVec3) -> Self {
-        Self { visible: loaded.visible.clone(), sim_box: loaded.sim_box, origin }
-    }
-}
-
-impl PartialEq for Framed {
-    fn eq(&self, other: &Self) -> bool {
-        let same = Arc::ptr_eq(&self.visible, &other.visible);
-        same && self.sim_box == other.sim_box && self.origin == other.origin
+        Self(Same(loaded.visible.clone()), loaded.sim_box, origin)
     }
 }
 
@@ -548,8 +582,7 @@ impl RangeKey {
 
 /// Makes a path absolute, so that a picture can be drawn again from any directory.
 pub(crate) fn make_absolute(source: &mut String) {
-    let is_path = !source.starts_with("demo:") && !source.starts_with("sim:");
-    if is_path && let Ok(path) = std::path::absolute(&*source) {
+    if !crate::open::is_made(source) && let Ok(path) = std::path::absolute(&*source) {
         *source = path.to_string_lossy().into_owned();
     }
 }

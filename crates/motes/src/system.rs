@@ -59,7 +59,7 @@ impl Loaded {
     ///
     /// # Errors
     /// There are no types.
-    pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
+    pub fn visible_by_type(&self) -> Result<Vec<(usize, Arc<Visible>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
         mark(&self.classes, self.visible(), &mut seen);
@@ -67,10 +67,10 @@ impl Loaded {
         let of_type = |kind: usize| {
             let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
             let all = grids.clone().map(|grid| Visibility::where_all(grid, &[], Some(&keep)));
-            (kind, all.collect::<Vec<_>>())
+            (kind, Arc::new(Visible::uncut(&self.classes, all.collect())))
         };
         let all = (0..types.len()).map(of_type);
-        Ok(all.filter(|(_, v)| v.iter().any(|v| v.visible() > 0)).collect())
+        Ok(all.filter(|(_, v)| v.all().iter().any(|v| v.visible() > 0)).collect())
     }
 
     /// What a tracer of spheres takes, pass by pass.

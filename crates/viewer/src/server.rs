@@ -32,8 +32,8 @@ const TIDYING: Duration = Duration::from_secs(30);
 const FAREWELL: Duration = Duration::from_millis(300);
 
 /// What the page may do: nothing beyond this server.
-const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; \
-    script-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; \
+    base-uri 'none'; form-action 'self'";
 
 /// A server that is bound to its address.
 pub struct Server {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motes::{
-    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Session, Shot, built_in_scene,
+    Film, FilmSettings, Layers, Picture, Scene, SceneError, Session, Shot, built_in_scene,
     is_picture, read_scene,
 };
 
@@ -227,7 +227,10 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             (last, last)
         }
     };
-    let shots = if plan.film { shots(session.scene(), (first, last)) } else { vec![first.into()] };
+    let shots = match plan.film {
+        true => Shot::film(session.scene(), first..=last),
+        false => vec![first.into()],
+    };
     if shots.len() > 1 {
         session.hold_view(first..=last, &meter)?;
     }
@@ -259,26 +262,6 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
     }
     talk.warn(&session.warnings());
     Ok(())
-}
-
-/// Seconds of a film of a single frame, where nothing else is said.
-const STILL_SECONDS: f64 = 8.0;
-
-/// The pictures of a film of the frames `first` to `last`.
-fn shots(scene: &Scene, (first, last): (usize, usize)) -> Vec<Shot> {
-    let frames = last - first + 1;
-    let pictures = match scene.film.frames {
-        Some(pictures) => pictures as usize,
-        None if frames == 1 && scene.camera.moves() => {
-            (STILL_SECONDS * scene.film.fps).ceil() as usize
-        }
-        None => frames,
-    };
-    let shot = |picture| Shot {
-        frame: first + picture * frames / pictures,
-        moment: Some(Moment { picture, pictures }),
-    };
-    (0..pictures).map(shot).collect()
 }
 
 impl Args {

@@ -3,6 +3,7 @@
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use motes::Gallery;
 use motes_viewer::Server;
@@ -21,6 +22,9 @@ Examples:
 /// The port that is tried first, so that bookmarks and tunnels stay.
 const PORT: u16 = 8765;
 
+/// How often new frames are looked for.
+const FOLLOWING: Duration = Duration::from_secs(1);
+
 /// As typed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, args_override_self = true)]
@@ -30,6 +34,9 @@ pub(crate) struct Args {
     /// Frame to begin with, from 0
     #[arg(long, value_name = "N", value_parser = whole)]
     frame: Option<u32>,
+    /// Look for new frames of files that are still being written
+    #[arg(long)]
+    follow: bool,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<usize>,
@@ -64,7 +71,10 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
     if let Some(threads) = args.threads {
         motes::set_threads(threads)?;
     }
-    let gallery = Gallery::open(scene)?;
+    let mut gallery = Gallery::open(scene)?;
+    if args.follow {
+        gallery.follow(FOLLOWING).map_err(Failure::data)?;
+    }
     let address = server.address().map_err(Failure::data)?;
     let host = match &args.listen {
         Some(name) if name.contains(':') => format!("[{name}]"),

@@ -1,10 +1,15 @@
 //! Requests and their answers.
 
+use std::time::Instant;
+
 use motes_scene::Scene;
 use motes_viewer::Request;
 use serde_json::{Map, Value, json};
 
 use super::guest::{Guest, lock};
+use super::inquire;
+use super::play::{Play, Running};
+use crate::session::Seen;
 use crate::{Error, Result};
 
 /// Largest canvas, pixels along a side and in all.
@@ -31,6 +36,12 @@ pub(super) fn answer(guest: &Guest, request: &Request, tell: &(dyn Fn(Value) + S
         "reset" => reset(guest, fields)?,
         "load" => load(guest, fields)?,
         "resize" => resize(guest, fields)?,
+        "play" => play(guest, fields)?,
+        "live" => live(guest, fields)?,
+        "pick" => return inquire_of(guest, |scene, seen| inquire::pick(scene, seen, numbers(fields, ["x", "y"])?)),
+        "select" => return inquire_of(guest, |scene, seen| inquire::choose(scene, seen, corners(fields)?)),
+        "histogram" => return inquire_of(guest, |_, seen| inquire::histogram(seen, fields)),
+        "check" => return inquire_of(guest, |_, seen| inquire::check(seen, fields)),
         "scene" => return Ok(with("text", super::command::scene_text(&lock(&guest.state).seen()))),
         "command" => return Ok(with("text", super::command::command(&lock(&guest.state).seen()))),
         other => {
@@ -48,6 +59,35 @@ fn with(name: &str, value: impl Into<Value>) -> Map<String, Value> {
     Map::from_iter([(name.to_owned(), value.into())])
 }
 
+/// Answers from what was drawn last.
+fn inquire_of(guest: &Guest, of: impl FnOnce(&Scene, &Seen) -> Result<Value>) -> Answer {
+    let scene = lock(&guest.state).seen();
+    let seen = lock(&guest.seen).clone();
+    let seen = seen.ok_or_else(|| missing("a picture first"))?;
+    match of(&scene, &seen)? {
+        Value::Object(answer) => Ok(answer),
+        other => Ok(with("value", other)),
+    }
+}
+
+/// Numbers by name, in 0 to 1.
+fn numbers<const N: usize>(fields: &Map<String, Value>, names: [&str; N]) -> Result<[f64; N]> {
+    let number = |name: &str| fields.get(name).and_then(Value::as_f64);
+    let all = names.map(number).map(|n| n.filter(|n| (0.0..=1.0).contains(n)));
+    match all.iter().all(Option::is_some) {
+        true => Ok(all.map(Option::unwrap_or_default)),
+        false => Err(missing(&format!("{}, each 0 to 1", names.join(", ")))),
+    }
+}
+
+/// The corners of a `box` of the picture.
+fn corners(fields: &Map<String, Value>) -> Result<[f64; 4]> {
+    let all = fields.get("box").and_then(Value::as_array);
+    let all: Option<Vec<f64>> = all.and_then(|all| all.iter().map(Value::as_f64).collect());
+    let all = all.and_then(|all| <[f64; 4]>::try_from(all).ok());
+    all.ok_or_else(|| missing("`box`, as [x0, y0, x1, y1]"))
+}
+
 fn missing(what: &str) -> Error {
     Error::Usage(format!("expected {what}"))
 }
@@ -61,10 +101,14 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
     let changes = fields.get("changes").and_then(Value::as_object);
     let changes = changes.ok_or_else(|| missing("`changes`, an object of paths and values"))?;
     let ends = fields.get("mark").and_then(Value::as_bool).unwrap_or(true);
+    let seen = lock(&guest.seen).clone();
     guest.change(|state| {
         let mut scene = state.scene().clone();
         for (path, value) in changes {
             put(&mut scene, path, value)?;
+        }
+        if let Some(seen) = &seen {
+            inquire::check_changes((&scene, state.scene()), seen)?;
         }
         state.change(scene, ends)
     })
@@ -117,6 +161,89 @@ fn load(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
         }
         state.change(scene, true)
     })
+}
+
+/// Lets frame follow frame, or ends that.
+fn play(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
+    let is = |name: &str, default| fields.get(name).and_then(Value::as_bool).unwrap_or(default);
+    let fps = fields.get("fps").and_then(Value::as_f64).unwrap_or(25.0);
+    if !(0.1..=240.0).contains(&fps) {
+        return Err(missing("`fps`, 0.1 to 240 frames a second"));
+    }
+    let play = Play { fps, around: is("loop", false), drop: is("drop", false) };
+    run(guest, is("on", true).then_some(play))
+}
+
+fn run(guest: &Guest, play: Option<Play>) -> Result<()> {
+    let frames = guest.frame_count() as u32;
+    let seen = lock(&guest.seen).clone();
+    guest.change(|state| {
+        let first = state.scene().image.frame;
+        // From its end a film begins again.
+        let first = if play.is_some() && first + 1 >= frames { 0 } else { first };
+        // What grows or moves in the course of it is not to move the camera.
+        if let Some(seen) = seen.filter(|_| play.is_some()) {
+            state.settle(|camera| stand(camera, &seen.resolved.view));
+        }
+        state.running = play.map(|play| Running::new(play, first, Instant::now()));
+        state.go_to(first);
+        Ok(())
+    })
+}
+
+/// Makes a camera stand as it was seen to.
+fn stand(camera: &mut motes_scene::Camera, view: &motes_scene::CameraView) {
+    if camera.position.is_none() || camera.target.is_none() {
+        (camera.position, camera.target) = (Some(view.eye), Some(view.target));
+    }
+    if view.projection == motes_scene::Projection::Orthographic {
+        camera.height.get_or_insert(2.0 * view.half_height);
+    }
+}
+
+/// Runs a simulation, step by step or on its own; from the start, or with other particles.
+fn live(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
+    let scene = lock(&guest.state).scene().clone();
+    if !scene.system.iter().any(|system| system.source.starts_with("sim:")) {
+        return Err(Error::Usage("no system is a simulation".into()));
+    }
+    if let Some(particles) = fields.get("particles") {
+        let count = particles.as_u64().filter(|n| (1..=20_000_000).contains(n));
+        let count = count.ok_or_else(|| missing("`particles`, 1 to 20000000"))?;
+        guest.reopen(&|source| with_particles(source, count))?;
+    }
+    let fps = Play { fps: scene.sph.fps.clamp(0.1, 240.0), around: false, drop: false };
+    match fields.get("action").and_then(Value::as_str).unwrap_or("run") {
+        "run" => run(guest, Some(fps)),
+        "pause" => run(guest, None),
+        "restart" => guest.change(|state| {
+            state.go_to(0);
+            if let Some(running) = &mut state.running {
+                *running = Running::new(running.play, 0, Instant::now());
+            }
+            Ok(())
+        }),
+        "step" => {
+            let last = guest.frame_count().saturating_sub(1) as u32;
+            guest.change(|state| {
+                state.running = None;
+                state.go_to(state.scene().image.frame.saturating_add(1).min(last));
+                Ok(())
+            })
+        }
+        _ => Err(missing("`action`: run, pause, step or restart")),
+    }
+}
+
+/// The source of a simulation with another number of particles; any other source as it is.
+fn with_particles(source: &str, count: u64) -> String {
+    let Some(simulation) = source.strip_prefix("sim:") else { return source.into() };
+    let (name, query) = simulation.split_once('?').unwrap_or((simulation, ""));
+    let others = query.split('&').filter(|p| !p.is_empty() && !p.starts_with("particles="));
+    let all: Vec<_> = std::iter::once(format!("particles={count}"))
+        .chain(others.map(str::to_owned))
+        .collect();
+    format!("sim:{name}?{}", all.join("&"))
 }
 
 fn resize(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {

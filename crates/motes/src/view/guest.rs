@@ -1,7 +1,8 @@
 //! One client: what it wants to see, and the pictures of it.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -10,8 +11,9 @@ use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
 
 use super::coarse::{Pace, simple};
+use super::play::Turn;
 use super::state::State;
-use super::{schema, systems};
+use super::{save, schema, systems};
 use crate::session::{Look, Seen};
 use crate::{Error, Result, Scene, Session, Watch};
 
@@ -19,6 +21,8 @@ use crate::{Error, Result, Scene, Session, Watch};
 const AT_ONCE: Duration = Duration::from_millis(60);
 /// After this, what moves is taken to stand still.
 const AT_REST: Duration = Duration::from_millis(150);
+/// How often more frames are looked for.
+const FOLLOWING: Duration = Duration::from_millis(500);
 /// Work that takes longer is told of.
 const LONG: Duration = Duration::from_secs(1);
 
@@ -31,7 +35,11 @@ pub(super) struct Guest {
     studio: Mutex<Studio>,
     /// What was drawn last.
     pub seen: Mutex<Option<Seen>>,
-    pub frames: usize,
+    /// How many frames there are; those of a growing source become more.
+    frames: Mutex<Arc<AtomicUsize>>,
+    /// How many there were when it was looked at last.
+    counted: AtomicUsize,
+    follows: bool,
 }
 
 /// What pictures are drawn with.
@@ -57,6 +65,14 @@ enum Grade {
     Exact,
 }
 
+/// What makes a picture the first of many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Moving {
+    Not,
+    Dragged,
+    Plays,
+}
+
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What is behind these locks is whole after every step.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -67,7 +83,7 @@ impl Guest {
     ///
     /// # Errors
     /// It cannot be.
-    pub fn new(mut session: Session, frames: usize) -> Result<Self> {
+    pub fn new(mut session: Session, frames: Arc<AtomicUsize>, follows: bool) -> Result<Self> {
         let state = State::new(session.scene().clone());
         let seen = session.survey(&crate::Quiet)?;
         let studio = Studio {
@@ -83,7 +99,9 @@ impl Guest {
             closed: AtomicBool::new(false),
             studio: Mutex::new(studio),
             seen: Mutex::new(Some(seen)),
-            frames,
+            counted: AtomicUsize::new(frames.load(Ordering::Acquire)),
+            frames: Mutex::new(frames),
+            follows,
         })
     }
 
@@ -93,6 +111,88 @@ impl Guest {
         let done = change(&mut state);
         self.newest.store(state.number, Ordering::Release);
         done
+    }
+
+    /// How many frames there are.
+    pub fn frame_count(&self) -> usize {
+        lock(&self.frames).load(Ordering::Acquire)
+    }
+
+    /// Goes on with other sources, from their first frame.
+    ///
+    /// # Errors
+    /// They cannot be opened.
+    pub fn reopen(&self, rename: &dyn Fn(&str) -> String) -> Result<()> {
+        let mut scene = lock(&self.state).scene().clone();
+        scene.system.iter_mut().for_each(|system| system.source = rename(&system.source));
+        let mut session = Session::open(scene, None)?;
+        let frames = session.frames(&crate::Quiet)?;
+        let mut studio = lock(&self.studio);
+        studio.session = session.share();
+        *lock(&self.frames) = Arc::new(AtomicUsize::new(frames));
+        self.counted.store(frames, Ordering::Release);
+        self.change(|state| {
+            state.rename(rename);
+            state.go_to(0);
+            Ok(())
+        })
+    }
+
+    /// A session of its own, for files.
+    fn own_session(&self, scene: Scene) -> Result<Session> {
+        let mut session = lock(&self.studio).session.share();
+        session.set_scene(scene)?;
+        Ok(session)
+    }
+
+    /// Goes on to the frame that is due, where frame follows frame; gives for how long nothing is.
+    fn go_on(&self, tell: &(dyn Fn(Value) + Sync)) -> Option<Duration> {
+        let frames = u32::try_from(self.frame_count()).unwrap_or(u32::MAX);
+        let turn = self.change(|state| {
+            let turn = state.running.as_mut().map(|running| running.turn(frames, Instant::now()));
+            match turn {
+                Some(Turn::Frame(frame)) => state.go_to(frame),
+                Some(Turn::End) => {
+                    state.running = None;
+                    state.changed();
+                }
+                Some(Turn::Wait(_)) | None => {}
+            }
+            Ok(turn)
+        });
+        match turn {
+            Ok(Some(Turn::Wait(time))) => Some(time),
+            Ok(Some(Turn::End)) => {
+                self.tell_scene(tell);
+                None
+            }
+            _ => None,
+        }
+    }
+
+    /// Goes to the newest frame, if there are more than before and the last one was shown.
+    fn keep_up(&self, tell: &(dyn Fn(Value) + Sync)) {
+        let count = self.frame_count();
+        let before = self.counted.swap(count, Ordering::AcqRel);
+        if count == before {
+            return;
+        }
+        let last = |count: usize| u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX);
+        let gone = self.change(|state| {
+            if state.scene().image.frame >= last(before) && state.running.is_none() {
+                state.go_to(last(count));
+            }
+            Ok(())
+        });
+        if gone.is_ok() {
+            self.tell_scene(tell);
+        }
+    }
+
+    fn tell_scene(&self, tell: &(dyn Fn(Value) + Sync)) {
+        let mut message = self.scene_message();
+        message.insert("is".into(), "scene".into());
+        tell(Value::Object(message));
     }
 
     /// The message about the scene as it stands.
@@ -105,10 +205,10 @@ impl Guest {
         message.insert("undo".into(), undo.into());
         message.insert("redo".into(), redo.into());
         let scene = state.seen();
-        let playing = state.play.is_some();
+        let about = (self.frame_count(), state.running.is_some());
         drop(state);
         if let Some(seen) = &*lock(&self.seen) {
-            message.insert("resolved".into(), systems::resolved(&scene, seen, (self.frames, playing)));
+            message.insert("resolved".into(), systems::resolved(&scene, seen, about));
         }
         message
     }
@@ -132,19 +232,49 @@ impl Guest {
     }
 
     /// Which picture comes next of a state, and whether it is the last of it.
-    fn grade(&self, studio: &mut Studio, number: u32, moving: bool) -> Option<(Grade, Next)> {
+    fn grade(&self, studio: &Studio, number: u32, moving: Moving) -> Option<(Grade, Next)> {
         let before = studio.drawn.filter(|(drawn, _)| *drawn == number).map(|(_, grade)| grade);
         let rests = studio.since.elapsed() >= AT_REST;
         let quick = studio.exact_took < AT_ONCE;
-        Some(match before {
-            None if moving => (Grade::Coarse, Next::After(AT_REST)),
-            None if quick => (Grade::Exact, Next::Asked),
-            None => (Grade::Coarse, Next::Now),
-            Some(Grade::Exact) => return None,
-            Some(_) if moving && !rests => return None,
-            Some(Grade::Coarse) if !studio.pace.is_whole() && !quick => (Grade::Simple, Next::Now),
-            Some(_) => (Grade::Exact, Next::Asked),
+        Some(match (before, moving) {
+            (None, Moving::Plays) => (Grade::Coarse, Next::Now),
+            (Some(_), Moving::Plays) => return None,
+            (None, Moving::Dragged) => (Grade::Coarse, Next::After(AT_REST)),
+            (None, _) if quick => (Grade::Exact, Next::Asked),
+            (None, _) => (Grade::Coarse, Next::Now),
+            (Some(Grade::Exact), _) => return None,
+            (Some(_), Moving::Dragged) if !rests => return None,
+            (Some(Grade::Coarse), _) if !studio.pace.is_whole() && !quick => {
+                (Grade::Simple, Next::Now)
+            }
+            (Some(_), _) => (Grade::Exact, Next::Asked),
         })
+    }
+
+    /// The picture as it is sent; beside an exact one more is told.
+    fn told(
+        &self,
+        ((look, took), grade, playing): ((Look, Duration), Grade, bool),
+        (scene, number): (&Scene, u32),
+        tell: &(dyn Fn(Value) + Sync),
+    ) -> Picture {
+        if grade == Grade::Exact {
+            self.tell_of(&look, tell);
+        } else {
+            *lock(&self.seen) = Some(look.seen);
+        }
+        let side = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
+        Picture {
+            size: (side(look.shown.width()), side(look.shown.height())),
+            rgb: rgb8(&look.shown),
+            exact: grade == Grade::Exact,
+            coarse: grade != Grade::Exact,
+            playing,
+            frame: scene.image.frame,
+            took,
+            state: number,
+            hash: look.hash,
+        }
     }
 
     /// Tells what the page shows beside an exact picture.
@@ -163,11 +293,9 @@ impl Guest {
         let had = lock(&self.seen).replace(look.seen.clone());
         if had.is_none_or(|had| systems::differ(&had, &look.seen)) {
             let scene = lock(&self.state).seen();
-            let all = systems::systems(&scene, &look.seen, self.frames);
+            let all = systems::systems(&scene, &look.seen, self.frame_count());
             tell(json!({"is": "systems", "systems": all}));
-            let mut message = self.scene_message();
-            message.insert("is".into(), "scene".into());
-            tell(Value::Object(message));
+            self.tell_scene(tell);
         }
     }
 }
@@ -180,7 +308,7 @@ impl View for Guest {
         hello.insert("colormaps".into(), schema::colormaps());
         let scene = lock(&self.state).seen();
         if let Some(seen) = &*lock(&self.seen) {
-            hello.insert("systems".into(), systems::systems(&scene, seen, self.frames).into());
+            hello.insert("systems".into(), systems::systems(&scene, seen, self.frame_count()).into());
         }
         hello.insert("limits".into(), super::ask::limits());
         hello
@@ -200,65 +328,92 @@ impl View for Guest {
         if link.anew {
             studio.drawn = None;
         }
+        self.keep_up(tell);
+        let wait = self.go_on(tell).or(self.follows.then_some(FOLLOWING));
         let (scene, number, moving) = {
             let state = lock(&self.state);
-            (state.seen(), state.number, state.moving())
+            let moving = match (state.running.is_some(), state.moving()) {
+                (true, _) => Moving::Plays,
+                (false, true) => Moving::Dragged,
+                (false, false) => Moving::Not,
+            };
+            (state.seen(), state.number, moving)
         };
-        let idle = Step { picture: None, next: Next::Asked };
+        let idle = Step { picture: None, next: wait.map_or(Next::Asked, Next::After) };
         let Some((grade, next)) = self.grade(studio, number, moving) else { return idle };
         if studio.drawn.is_none_or(|(drawn, _)| drawn != number) {
             studio.since = Instant::now();
         }
-        let (look, took) = match self.picture(studio, (&scene, number, grade), tell) {
-            Ok(made) => made,
-            Err(Error::Cancelled) => return Step { picture: None, next: Next::Now },
+        let next = match next {
+            Next::Asked => wait.map_or(Next::Asked, Next::After),
+            next => next,
+        };
+        match self.picture(studio, (&scene, number, grade), tell) {
+            Ok(made) => {
+                studio.drawn = Some((number, grade));
+                studio.learn(&scene, (grade, &made), link);
+                let playing = moving == Moving::Plays;
+                let picture = self.told((made, grade, playing), (&scene, number), tell);
+                Step { picture: Some(picture), next }
+            }
+            Err(Error::Cancelled) => Step { picture: None, next: Next::Now },
             Err(error) => {
                 studio.drawn = Some((number, Grade::Exact));
                 let text = error.to_string();
                 tell(json!({"is": "notice", "severity": "error", "text": text}));
-                return idle;
+                idle
             }
-        };
-        studio.drawn = Some((number, grade));
-        match grade {
-            Grade::Exact => studio.exact_took = took,
-            Grade::Coarse => {
-                let canvas = f64::from(scene.image.width) * f64::from(scene.image.height) / 1e6;
-                let megapixels = look.shown.color().len() as f64 / 1e6;
-                studio.pace.learn((megapixels, canvas), took, link.encoding);
-            }
-            Grade::Simple => {}
         }
-        if grade == Grade::Exact {
-            self.tell_of(&look, tell);
-        } else {
-            *lock(&self.seen) = Some(look.seen.clone());
-        }
-        let side = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
-        let picture = Picture {
-            size: (side(look.shown.width()), side(look.shown.height())),
-            rgb: rgb8(&look.shown),
-            exact: grade == Grade::Exact,
-            coarse: grade != Grade::Exact,
-            playing: false,
-            frame: scene.image.frame,
-            took,
-            state: number,
-            hash: look.hash,
-        };
-        Step { picture: Some(picture), next }
     }
 
     fn save(
         &self,
         file: &str,
-        _wanted: &BTreeMap<String, String>,
+        wanted: &BTreeMap<String, String>,
     ) -> std::result::Result<Vec<u8>, String> {
-        Err(format!("{file}: not yet"))
+        let made = || {
+            let scene = save::scene_of(lock(&self.state).seen(), wanted)?;
+            let watch = Saving { closed: &self.closed };
+            match file {
+                "scene.toml" => Ok(super::command::scene_text(&scene).into_bytes()),
+                "film.mp4" => {
+                    let session = self.own_session(scene)?;
+                    save::film(session, (wanted, self.frame_count()), &watch)
+                }
+                file => save::picture(&mut self.own_session(scene)?, file, &watch),
+            }
+        };
+        made().map_err(|error: Error| error.to_string())
     }
 
     fn close(&self) {
         self.closed.store(true, Ordering::Release);
+    }
+}
+
+impl Studio {
+    /// Learns from a picture how the next ones are to be.
+    fn learn(&mut self, scene: &Scene, (grade, (look, took)): (Grade, &(Look, Duration)), link: Link) {
+        match grade {
+            Grade::Exact => self.exact_took = *took,
+            Grade::Coarse => {
+                let canvas = f64::from(scene.image.width) * f64::from(scene.image.height) / 1e6;
+                let megapixels = look.shown.color().len() as f64 / 1e6;
+                self.pace.learn((megapixels, canvas), *took, link.encoding);
+            }
+            Grade::Simple => {}
+        }
+    }
+}
+
+/// Ends saving with the visit.
+struct Saving<'a> {
+    closed: &'a AtomicBool,
+}
+
+impl Watch for Saving<'_> {
+    fn progress(&self, _: &'static str, _: u64, _: u64) -> bool {
+        !self.closed.load(Ordering::Acquire)
     }
 }
 

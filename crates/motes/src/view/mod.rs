@@ -5,29 +5,36 @@
 //!                        state.rs   its scene, undo and redo, what is moving or playing
 //!                        ask.rs     requests ── change ──► state, or look at what is shown
 //!                        guest.rs   draws the newest state: coarse (coarse.rs) while it moves, then exact
-//!                        schema.rs, systems.rs, pick.rs, command.rs, save.rs: what they tell
+//!                        schema.rs, systems.rs, inquire.rs, command.rs, save.rs: what they tell
 //! ```
 
 mod ask;
 mod coarse;
 mod command;
 mod guest;
+mod inquire;
+mod play;
+mod save;
 mod schema;
 mod state;
 mod systems;
 
-use std::sync::{Mutex, PoisonError};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use motes_viewer::{Exhibit, View};
 
 use crate::{Quiet, Result, Scene, Session};
-use guest::Guest;
+use guest::{Guest, lock};
 
 /// A scene and its open sources, for any number of clients.
 pub struct Gallery {
     /// What each client begins with.
-    session: Mutex<Session>,
-    frames: usize,
+    session: Arc<Mutex<Session>>,
+    follows: bool,
+    frames: Arc<AtomicUsize>,
 }
 
 impl Gallery {
@@ -38,7 +45,8 @@ impl Gallery {
     pub fn open(scene: Scene) -> Result<Self> {
         let mut session = Session::open(scene, None)?;
         let frames = session.frames(&Quiet)?;
-        Ok(Self { session: Mutex::new(session), frames })
+        let frames = Arc::new(AtomicUsize::new(frames));
+        Ok(Self { session: Arc::new(Mutex::new(session)), follows: false, frames })
     }
 }
 
@@ -51,10 +59,54 @@ pub fn set_threads(threads: usize) -> Result<()> {
     global.map_err(|e| crate::Error::Usage(format!("threads: {e}")))
 }
 
+impl Gallery {
+    /// Follows sources that grow: looks for more frames every so often, as long as the gallery is there.
+    /// Who looks at the last frame then gets the new last one.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn follow(&mut self, every: Duration) -> std::io::Result<()> {
+        self.follows = true;
+        let (session, frames) = (Arc::downgrade(&self.session), self.frames.clone());
+        let mut before = Vec::new();
+        let thread = std::thread::Builder::new().name("follow".into());
+        thread.spawn(move || {
+            while let Some(session) = session.upgrade() {
+                let session = lock(&session);
+                let sources = session.scene().system.iter().map(|s| &*s.source);
+                let now: Vec<_> = sources.map(Stamp::of).collect();
+                if now != before {
+                    // What is being written may not be fit to be read yet.
+                    if let Ok(count) = session.refresh() {
+                        frames.store(count, Ordering::Release);
+                        before = now;
+                    }
+                }
+                drop(session);
+                std::thread::sleep(every);
+            }
+        })?;
+        Ok(())
+    }
+}
+
+/// What changes when a source grows: the length of its file, and when its folder last changed.
+#[derive(PartialEq)]
+struct Stamp(Option<u64>, Option<std::time::SystemTime>);
+
+impl Stamp {
+    fn of(source: &str) -> Self {
+        let path = Path::new(source);
+        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+        let changed = folder.unwrap_or(Path::new(".")).metadata().and_then(|m| m.modified());
+        Self(path.metadata().ok().map(|m| m.len()), changed.ok())
+    }
+}
+
 impl Exhibit for Gallery {
     fn open(&self) -> std::result::Result<Box<dyn View>, String> {
-        let session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
-        let guest = Guest::new(session.share(), self.frames);
+        let session = lock(&self.session).share();
+        let guest = Guest::new(session, self.frames.clone(), self.follows);
         Ok(Box::new(guest.map_err(|e| e.to_string())?))
     }
 }

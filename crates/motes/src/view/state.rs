@@ -2,6 +2,7 @@
 
 use motes_scene::Scene;
 
+use super::play::Running;
 use crate::{Error, Result};
 
 /// Changes that can be undone.
@@ -20,24 +21,15 @@ pub(super) struct State {
     pub size: (u32, u32),
     /// Number of the last change of any kind.
     pub number: u32,
-    pub play: Option<Play>,
-}
-
-/// Frame after frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Play {
-    pub fps: f64,
-    /// Whether the first frame follows the last.
-    pub around: bool,
-    /// Whether frames are left out where they would come late.
-    pub drop: bool,
+    /// What runs, if frame follows frame.
+    pub running: Option<Running>,
 }
 
 impl State {
     pub fn new(scene: Scene) -> Self {
         let size = (scene.image.width, scene.image.height);
         let (past, future) = (Vec::new(), Vec::new());
-        Self { scene, past, future, gesture: None, size, number: 1, play: None }
+        Self { scene, past, future, gesture: None, size, number: 1, running: None }
     }
 
     pub fn scene(&self) -> &Scene {
@@ -125,6 +117,20 @@ impl State {
     /// Goes to a frame, which is no change of the scene that could be undone.
     pub fn go_to(&mut self, frame: u32) {
         self.scene.image.frame = frame;
+        self.changed();
+    }
+
+    /// Makes the camera stand where it does, which looks the same and cannot be undone.
+    pub fn settle(&mut self, stand: impl FnOnce(&mut motes_scene::Camera)) {
+        stand(&mut self.scene.camera);
+    }
+
+    /// Gives the systems of all scenes, before and after too, other sources.
+    pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
+        let all = self.past.iter_mut().chain(&mut self.future).chain(&mut self.gesture);
+        for system in all.chain([&mut self.scene]).flat_map(|scene| &mut scene.system) {
+            system.source = rename(&system.source);
+        }
         self.changed();
     }
 

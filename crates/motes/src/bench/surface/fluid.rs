@@ -85,6 +85,7 @@ impl Fluid {
         };
         let matter = Matter {
             particles: motes_surface::Particles::Unsorted(&self.particles.positions, radii),
+            identity: None,
             visible: self.drawable,
             mean_radius: self.mean_radius,
             greatest_radius: self.greatest_radius,
@@ -101,6 +102,7 @@ impl Fluid {
             level: Level::new(),
             others: None,
             opened: None,
+            boundaries: None,
         }
     }
 
@@ -155,7 +157,7 @@ impl Fluid {
 
 /// What is to be drawn, and what is known of it.
 pub(super) struct Extracted {
-    pub boundary: Boundary,
+    pub boundary: Arc<Boundary>,
     pub stats: Stats,
 }
 
