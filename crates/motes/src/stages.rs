@@ -240,3 +240,96 @@ impl Stages {
 fn spare(grids: Option<(GridKey, Arc<RadiusClasses>)>) -> RadiusClasses {
     grids.and_then(|(_, classes)| Arc::try_unwrap(classes).ok()).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use motes_particles::read::Wanted;
+
+    use super::*;
+
+    /// Stages of a demo set, and its particles.
+    fn demo(source: &str) -> (Stages, Arc<Particles>) {
+        let mut series = crate::open(source).unwrap();
+        (Stages::default(), series.frame(0, &Wanted::All, &|_, _| {}).unwrap())
+    }
+
+    fn load(of: &mut (Stages, Arc<Particles>), assignments: &[&str]) -> Loaded {
+        let mut scene = Scene::default();
+        assignments.iter().for_each(|a| scene.set_text(a).unwrap());
+        let system = scene.system[0].clone();
+        of.0.load(of.1.clone(), (&scene, &system), (0, DVec3::ZERO), None).unwrap()
+    }
+
+    /// Which stages two loads share: grids, visibility, paint.
+    fn shared(a: &Loaded, b: &Loaded) -> [bool; 3] {
+        [
+            Arc::ptr_eq(&a.classes, &b.classes),
+            Arc::ptr_eq(&a.visible, &b.visible),
+            Arc::ptr_eq(&a.paint, &b.paint),
+        ]
+    }
+
+    #[test]
+    fn only_what_depends_on_a_change_is_made_again() {
+        let mut of = demo("demo:random:500");
+        let first = load(&mut of, &[]);
+        for (assignments, expected) in [
+            (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
+            (&["overlay.box=on", "renderer=surface"], [true, true, true]),
+            (&["system.where=Index < 100"], [true, false, true]),
+            (&["system.filter=[{ min = 0.5 }]"], [true, false, true]),
+            (&["system.color.by=Position"], [true, true, false]),
+            (&["system.opacity=0.5"], [true, true, false]),
+            (&["system.radius_scale=2"], [false, false, true]),
+            (&["spheres.lambda=2"], [false, false, true]),
+            (&["system.name=else"], [true, true, true]),
+        ] {
+            let before = load(&mut of, &[]);
+            let after = load(&mut of, assignments);
+            assert_eq!(shared(&before, &after), expected, "{assignments:?}");
+            let fresh = load(&mut (Stages::default(), of.1.clone()), assignments);
+            assert_eq!(after.count_visible(), fresh.count_visible(), "{assignments:?}");
+            assert_eq!(after.classes.grids[0].greatest_radius, fresh.classes.grids[0].greatest_radius);
+        }
+        of.1 = Arc::new(Particles::clone(&of.1));
+        assert_eq!(shared(&first, &load(&mut of, &[])), [false; 3]);
+    }
+
+    #[test]
+    fn what_coincides_is_hidden_again_once_it_is_opaque() {
+        let mut particles = Particles { positions: vec![[0.0; 3]; 600], ..Particles::default() };
+        particles.radius = motes_particles::Radius::Uniform(1.0);
+        let mut of = (Stages::default(), Arc::new(particles));
+        let drawn = |loaded: &Loaded| {
+            let grid = &loaded.classes.grids[0];
+            let blocks = 0..grid.blocks.len() - 1;
+            let of_block = |block| {
+                let seen = loaded.visible[0].block(grid, block);
+                grid.particles_of(block).enumerate().filter(|(i, _)| seen.shows(*i)).count()
+            };
+            blocks.map(of_block).sum::<usize>()
+        };
+        let opaque = load(&mut of, &[]);
+        assert_eq!((drawn(&opaque), opaque.count_visible()), (1, 600));
+        // With and without others looking at the grids.
+        for _ in 0..2 {
+            let clear = load(&mut of, &["system.opacity=0.5"]);
+            assert_eq!((drawn(&clear), clear.count_visible()), (600, 600));
+            assert_eq!(drawn(&load(&mut of, &[])), 1);
+        }
+        drop(opaque);
+        assert_eq!(drawn(&load(&mut of, &["system.opacity=0.5"])), 600);
+        assert_eq!(drawn(&load(&mut of, &[])), 1);
+    }
+
+    #[test]
+    fn a_mistake_leaves_what_was_there() {
+        let mut of = demo("demo:random:500");
+        let before = load(&mut of, &[]);
+        let mut scene = Scene::default();
+        scene.set_text("system.where=Nothing > 1").unwrap();
+        let system = scene.system[0].clone();
+        assert!(of.0.load(of.1.clone(), (&scene, &system), (0, DVec3::ZERO), None).is_err());
+        assert_eq!(shared(&before, &load(&mut of, &[])), [true; 3]);
+    }
+}

@@ -256,8 +256,11 @@ fn resize(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
         return Err(missing(&format!("at most {PIXELS} pixels")));
     }
     guest.change(|state| {
-        state.size = (width as u32, height as u32);
-        state.changed();
+        let size = (width as u32, height as u32);
+        if state.size != size {
+            state.size = size;
+            state.changed();
+        }
         Ok(())
     })
 }

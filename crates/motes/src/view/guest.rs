@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use motes_frame::rgb8;
+use motes_scene::Renderer;
 use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
 
@@ -45,7 +46,8 @@ pub(super) struct Guest {
 /// What pictures are drawn with.
 struct Studio {
     session: Session,
-    pace: Pace,
+    /// How coarse pictures are, by way of seeing.
+    paces: [(Renderer, Pace); 3],
     /// The state that was drawn last, and how well.
     drawn: Option<(u32, Grade)>,
     /// How long the last exact picture took.
@@ -88,7 +90,8 @@ impl Guest {
         let seen = session.survey(&crate::Quiet)?;
         let studio = Studio {
             session,
-            pace: Pace::default(),
+            paces: [Renderer::Spheres, Renderer::Surface, Renderer::Density]
+                .map(|renderer| (renderer, Pace::before(renderer))),
             drawn: None,
             exact_took: Duration::MAX,
             since: Instant::now(),
@@ -221,7 +224,7 @@ impl Guest {
         tell: &(dyn Fn(Value) + Sync),
     ) -> Result<(Look, Duration)> {
         let of = match grade {
-            Grade::Coarse => studio.pace.coarse(scene),
+            Grade::Coarse => studio.pace(scene).coarse(scene),
             Grade::Simple => simple(scene),
             Grade::Exact => scene.clone(),
         };
@@ -232,7 +235,12 @@ impl Guest {
     }
 
     /// Which picture comes next of a state, and whether it is the last of it.
-    fn grade(&self, studio: &Studio, number: u32, moving: Moving) -> Option<(Grade, Next)> {
+    fn grade(
+        &self,
+        (studio, whole): (&Studio, bool),
+        number: u32,
+        moving: Moving,
+    ) -> Option<(Grade, Next)> {
         let before = studio.drawn.filter(|(drawn, _)| *drawn == number).map(|(_, grade)| grade);
         let rests = studio.since.elapsed() >= AT_REST;
         let quick = studio.exact_took < AT_ONCE;
@@ -244,7 +252,7 @@ impl Guest {
             (None, _) => (Grade::Coarse, Next::Now),
             (Some(Grade::Exact), _) => return None,
             (Some(_), Moving::Dragged) if !rests => return None,
-            (Some(Grade::Coarse), _) if !studio.pace.is_whole() && !quick => {
+            (Some(Grade::Coarse), _) if !whole && !quick => {
                 (Grade::Simple, Next::Now)
             }
             (Some(_), _) => (Grade::Exact, Next::Asked),
@@ -340,7 +348,8 @@ impl View for Guest {
             (state.seen(), state.number, moving)
         };
         let idle = Step { picture: None, next: wait.map_or(Next::Asked, Next::After) };
-        let Some((grade, next)) = self.grade(studio, number, moving) else { return idle };
+        let whole = studio.pace(&scene).is_whole();
+        let Some((grade, next)) = self.grade((studio, whole), number, moving) else { return idle };
         if studio.drawn.is_none_or(|(drawn, _)| drawn != number) {
             studio.since = Instant::now();
         }
@@ -392,6 +401,12 @@ impl View for Guest {
 }
 
 impl Studio {
+    /// How coarse pictures of a scene are.
+    fn pace(&mut self, scene: &Scene) -> &mut Pace {
+        let at = self.paces.iter().position(|(renderer, _)| *renderer == scene.renderer);
+        &mut self.paces[at.unwrap_or(0)].1
+    }
+
     /// Learns from a picture how the next ones are to be.
     fn learn(&mut self, scene: &Scene, (grade, (look, took)): (Grade, &(Look, Duration)), link: Link) {
         match grade {
@@ -399,7 +414,7 @@ impl Studio {
             Grade::Coarse => {
                 let canvas = f64::from(scene.image.width) * f64::from(scene.image.height) / 1e6;
                 let megapixels = look.shown.color().len() as f64 / 1e6;
-                self.pace.learn((megapixels, canvas), *took, link.encoding);
+                self.pace(scene).learn((megapixels, canvas), *took, link.encoding);
             }
             Grade::Simple => {}
         }
