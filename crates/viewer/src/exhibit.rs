@@ -47,6 +47,9 @@ pub trait View: Send + Sync {
     /// What is told to the client.
     fn save(&self, file: &str, wanted: &BTreeMap<String, String>) -> Result<Vec<u8>, String>;
 
+    /// Lets go of what can be made again: nobody has been here for a while.
+    fn rest(&self);
+
     /// Ends work that goes on: nobody will ask again.
     fn close(&self);
 }

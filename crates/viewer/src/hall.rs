@@ -12,6 +12,8 @@ use crate::visit::Visit;
 
 /// Views at once.
 const MOST: usize = 32;
+/// How long a view without a client keeps what can be made again.
+const AWAKE: Duration = Duration::from_secs(60);
 /// How long a view lives without a client.
 const KEPT: Duration = Duration::from_secs(600);
 
@@ -59,6 +61,8 @@ impl Hall {
             stays
         });
         over.iter().for_each(|visit| visit.close(None));
+        let all: Vec<_> = self.visits().values().cloned().collect();
+        all.iter().for_each(|visit| visit.rest(AWAKE));
     }
 
     /// Ends all visits, with a last message.

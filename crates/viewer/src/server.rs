@@ -151,7 +151,8 @@ struct House {
 async fn tidy(house: Arc<House>) {
     loop {
         tokio::time::sleep(TIDYING).await;
-        house.hall.tidy();
+        let house = house.clone();
+        let _ = tokio::task::spawn_blocking(move || house.hall.tidy()).await;
     }
 }
 

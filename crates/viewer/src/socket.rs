@@ -7,7 +7,7 @@ use axum::extract::ws::{Message, WebSocket};
 use futures_util::stream::SplitSink;
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Map, Value};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use crate::Request;
 use crate::visit::{Visit, answer_to, text};
@@ -21,16 +21,26 @@ const RATE: f64 = 400.0;
 const BURST: f64 = 800.0;
 /// A client that takes nothing for so long has gone.
 const STALLED: Duration = Duration::from_secs(60);
+/// So often a client is asked whether it is there, if nothing else is said; and if it does not answer for so
+/// long, it is not.
+const PING: Duration = Duration::from_secs(20);
+const SILENT: Duration = Duration::from_secs(90);
 
 /// Serves a connection to a view until it ends.
 pub(crate) async fn serve(socket: WebSocket, visit: Arc<Visit>) {
     let (sink, mut stream) = socket.split();
     let (outbox, messages) = mpsc::channel(OUTBOX);
     let replies = outbox.downgrade();
-    let connection = visit.attach(outbox);
-    let writer = tokio::spawn(write(sink, messages));
+    let (connection, replaced) = visit.attach(outbox);
+    let writer = tokio::spawn(write(sink, messages, replaced.clone()));
     let mut pace = Pace::new(Instant::now());
-    while let Some(Ok(message)) = stream.next().await {
+    loop {
+        let next = tokio::time::timeout(SILENT, stream.next());
+        let next = tokio::select! {
+            next = next => next,
+            () = is_replaced(replaced.clone()) => break,
+        };
+        let Ok(Some(Ok(message))) = next else { break };
         tokio::time::sleep(pace.wait(Instant::now())).await;
         let message = match message {
             Message::Text(text) => understand(&text),
@@ -61,14 +71,34 @@ pub(crate) async fn serve(socket: WebSocket, visit: Arc<Visit>) {
     let _ = writer.await;
 }
 
-async fn write(mut sink: SplitSink<WebSocket, Message>, mut messages: mpsc::Receiver<Message>) {
-    while let Some(message) = messages.recv().await {
-        match tokio::time::timeout(STALLED, sink.send(message)).await {
-            Ok(Ok(())) => {}
-            _ => break,
+async fn write(
+    mut sink: SplitSink<WebSocket, Message>,
+    mut messages: mpsc::Receiver<Message>,
+    replaced: watch::Receiver<bool>,
+) {
+    loop {
+        let message = match tokio::time::timeout(PING, messages.recv()).await {
+            Ok(Some(message)) => message,
+            Ok(None) => break,
+            Err(_) => Message::Ping(Default::default()),
+        };
+        let sent = tokio::time::timeout(STALLED, sink.send(message));
+        let sent = tokio::select! {
+            sent = sent => sent,
+            () = is_replaced(replaced.clone()) => break,
+        };
+        if !matches!(sent, Ok(Ok(()))) {
+            break;
         }
     }
     let _ = tokio::time::timeout(Duration::from_secs(1), sink.close()).await;
+}
+
+/// Ends when there is a newer connection to the view, and only then.
+async fn is_replaced(mut replaced: watch::Receiver<bool>) {
+    if replaced.wait_for(|replaced| *replaced).await.is_err() {
+        std::future::pending().await
+    }
 }
 
 /// A message's number and request, or its number and what is wrong with it.

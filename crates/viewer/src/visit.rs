@@ -1,14 +1,16 @@
-//! One client's view while it is here, and for some minutes after: a thread that answers, and one that
-//! draws whenever something has changed and the client has taken what was sent before.
+//! One client's view while it is here, and for some minutes after: a thread that answers, one that
+//! draws whenever something has changed and the client has taken what was sent before, and one that encodes
+//! a picture while the next is drawn.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::Message;
 use serde_json::{Map, Value, json};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use crate::encode::{Codec, frame};
 use crate::{Link, Next, Picture, Request, View};
@@ -46,7 +48,9 @@ struct Gate {
     /// The connection, if there is one, and its number.
     outbox: Option<mpsc::Sender<Message>>,
     connection: u64,
-    /// Serials of frames that are under way, when they were sent, and how.
+    /// Tells that connection that there is a newer one.
+    replaced: watch::Sender<bool>,
+    /// Serials of frames that are under way, and when they were drawn.
     under_way: VecDeque<(u32, Instant)>,
     serial: u32,
     /// Something has changed.
@@ -59,6 +63,8 @@ struct Gate {
     left: Instant,
     encoding: Duration,
     quality: u8,
+    /// Whether the view has let go of what can be made again.
+    rested: bool,
     closed: bool,
 }
 
@@ -72,6 +78,7 @@ impl Visit {
         let gate = Gate {
             outbox: None,
             connection: 0,
+            replaced: watch::channel(false).0,
             under_way: VecDeque::new(),
             serial: 0,
             woken: true,
@@ -80,6 +87,7 @@ impl Visit {
             left: Instant::now(),
             encoding: Duration::ZERO,
             quality: *QUALITY.end(),
+            rested: false,
             closed: false,
         };
         let (gate, wake) = (Mutex::new(gate), Condvar::new());
@@ -87,14 +95,17 @@ impl Visit {
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let own = visit.clone();
         thread("answers").spawn(move || own.answer_all(asked))?;
+        let (pictures, drawn) = sync_channel(0);
         let own = visit.clone();
-        thread("pictures").spawn(move || own.draw_all())?;
+        thread("pictures").spawn(move || own.draw_all(&pictures))?;
+        let own = visit.clone();
+        thread("frames").spawn(move || drawn.iter().for_each(|drawn| own.send(&drawn)))?;
         Ok(visit)
     }
 
     /// Connects a client: it is greeted, and gets a picture. A former connection ends. Gives the
-    /// connection's number.
-    pub fn attach(&self, outbox: mpsc::Sender<Message>) -> u64 {
+    /// connection's number, and what will tell it that there is a newer one.
+    pub fn attach(&self, outbox: mpsc::Sender<Message>) -> (u64, watch::Receiver<bool>) {
         let mut hello = self.view.hello();
         hello.insert("is".into(), "hello".into());
         hello.insert("view".into(), self.key.clone().into());
@@ -103,10 +114,13 @@ impl Visit {
         let mut gate = self.gate();
         gate.outbox = Some(outbox);
         gate.connection += 1;
+        let (replaced, is_replaced) = watch::channel(false);
+        std::mem::replace(&mut gate.replaced, replaced).send_replace(true);
+        gate.rested = false;
         gate.under_way.clear();
         (gate.woken, gate.anew) = (true, true);
         self.wake.notify_all();
-        gate.connection
+        (gate.connection, is_replaced)
     }
 
     /// Ends a connection, if it is still the one.
@@ -114,6 +128,17 @@ impl Visit {
         let mut gate = self.gate();
         if gate.connection == connection {
             (gate.outbox, gate.left) = (None, Instant::now());
+        }
+    }
+
+    /// Lets go of what can be made again, once, if nobody has been here for a while.
+    pub fn rest(&self, after: Duration) {
+        let mut gate = self.gate();
+        let rests = gate.outbox.is_none() && !gate.rested && gate.left.elapsed() > after;
+        gate.rested |= rests;
+        drop(gate);
+        if rests {
+            self.view.rest();
         }
     }
 
@@ -186,14 +211,15 @@ impl Visit {
         }
     }
 
-    fn draw_all(&self) {
+    fn draw_all(&self, pictures: &SyncSender<Drawn>) {
         while let Some(link) = self.wait() {
             let tell = |value| self.tell_value(value);
             let drawn = catch_unwind(AssertUnwindSafe(|| self.view.draw(link, &tell)));
             let next = match drawn {
                 Ok(step) => {
-                    if let Some(picture) = step.picture {
-                        self.send(&picture);
+                    let drawn = step.picture.map(|picture| self.under_way(picture));
+                    if drawn.is_some_and(|drawn| pictures.send(drawn).is_err()) {
+                        return;
                     }
                     step.next
                 }
@@ -240,21 +266,26 @@ impl Visit {
         }
     }
 
-    /// Encodes a picture and sends it.
-    fn send(&self, picture: &Picture) {
-        let (serial, quality) = {
-            let mut gate = self.gate();
-            gate.serial = gate.serial.wrapping_add(1);
-            (gate.serial, gate.quality)
-        };
+    /// Counts a picture among the frames that are under way.
+    fn under_way(&self, picture: Picture) -> Drawn {
+        let mut gate = self.gate();
+        gate.serial = gate.serial.wrapping_add(1);
+        let serial = gate.serial;
+        gate.under_way.push_back((serial, Instant::now()));
+        Drawn { picture, serial, quality: gate.quality, connection: gate.connection }
+    }
+
+    /// Encodes a picture and sends it, if the client for whom it was drawn is still there.
+    fn send(&self, drawn: &Drawn) {
+        let Drawn { picture, serial, quality, connection } = drawn;
         let pixels = usize::from(picture.size.0) * usize::from(picture.size.1);
         let codec = match picture.exact && !picture.playing {
-            true if quality >= LOSSLESS_FROM && pixels <= LOSSLESS_PIXELS => Codec::Png,
+            true if *quality >= LOSSLESS_FROM && pixels <= LOSSLESS_PIXELS => Codec::Png,
             true => Codec::Jpeg(NEARLY_LOSSLESS),
-            false => Codec::Jpeg(quality),
+            false => Codec::Jpeg(*quality),
         };
         let start = Instant::now();
-        let bytes = match frame(picture, serial, codec) {
+        let bytes = match frame(picture, *serial, codec) {
             Ok(bytes) => bytes,
             Err(error) => {
                 let notice = json!({"is": "notice", "severity": "error", "text": error});
@@ -263,14 +294,24 @@ impl Visit {
         };
         let took = start.elapsed();
         let mut gate = self.gate();
-        if codec == Codec::Jpeg(quality) {
+        if codec == Codec::Jpeg(*quality) {
             gate.encoding = took.mul_f64(1e6 / pixels as f64);
         }
-        let Some(outbox) = gate.outbox.clone() else { return };
-        gate.under_way.push_back((serial, Instant::now()));
+        let outbox = gate.outbox.clone().filter(|_| gate.connection == *connection);
         drop(gate);
-        let _ = outbox.blocking_send(Message::Binary(bytes.into()));
+        if let Some(outbox) = outbox {
+            let _ = outbox.blocking_send(Message::Binary(bytes.into()));
+        }
     }
+}
+
+/// A picture that is to be sent.
+struct Drawn {
+    picture: Picture,
+    serial: u32,
+    quality: u8,
+    /// The connection that it was drawn for.
+    connection: u64,
 }
 
 /// The answer to request `id`.

@@ -79,6 +79,8 @@ impl View for Counter {
         }
     }
 
+    fn rest(&self) {}
+
     fn close(&self) {}
 }
 
@@ -156,8 +158,10 @@ impl Client<'_> {
 
     /// The next message; none if nothing comes, or the connection has ended.
     fn next(&mut self) -> Option<Message> {
-        let next = tokio::time::timeout(Duration::from_secs(5), self.socket.next());
-        self.running.runtime.block_on(async { next.await.ok()??.ok() })
+        self.running.runtime.block_on(async {
+            let next = tokio::time::timeout(Duration::from_secs(5), self.socket.next());
+            next.await.ok()??.ok()
+        })
     }
 
     /// The next text for which something holds.
@@ -264,6 +268,26 @@ fn a_view_is_asked_and_drawn_and_outlives_its_connection() {
 }
 
 #[test]
+fn a_newer_connection_takes_over_from_one_that_hangs() {
+    let server = Running::start();
+    let mut client = server.enter();
+    let key = client.hear(|_| true)["view"].as_str().unwrap().to_owned();
+    // It takes nothing of thousands of answers, until no more can be sent.
+    server.runtime.block_on(async {
+        for id in 0..3000 {
+            let text = json!({"id": id, "do": "x".repeat(2000)}).to_string();
+            let send = client.socket.feed(Message::text(text));
+            if tokio::time::timeout(Duration::from_millis(300), send).await.is_err() {
+                break;
+            }
+        }
+    });
+    let mut again = server.connect(&format!("token={}&view={key}", server.token), None).unwrap();
+    again.say(&json!({"id": 1, "do": "add"}));
+    assert!(again.hear(|v| v["re"] == 1 && v.get("error").is_none())["count"].is_number());
+}
+
+#[test]
 fn two_frames_are_under_way_and_no_more() {
     let server = Running::start();
     let mut client = server.enter();
@@ -275,8 +299,8 @@ fn two_frames_are_under_way_and_no_more() {
         let until = Instant::now() + Duration::from_millis(200);
         while Instant::now() < until {
             let left = until.saturating_duration_since(Instant::now());
-            let next = tokio::time::timeout(left, client.socket.next());
-            match client.running.runtime.block_on(async { next.await }) {
+            let next = async { tokio::time::timeout(left, client.socket.next()).await };
+            match client.running.runtime.block_on(next) {
                 Ok(Some(Ok(Message::Binary(_)))) => return false,
                 Ok(Some(Ok(_))) | Err(_) => {}
                 Ok(other) => panic!("{other:?}"),

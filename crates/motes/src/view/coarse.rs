@@ -5,7 +5,7 @@ use std::time::Duration;
 use motes_scene::{Renderer, Scene};
 
 /// What a frame may take, while something moves, with its encoding.
-const IN_TIME: Duration = Duration::from_millis(31);
+const IN_TIME: Duration = Duration::from_millis(28);
 /// How many times smaller than the canvas pictures may be, along each side: steps, as sizes that hardly
 /// differ only flicker.
 const STEPS: [f64; 8] = [1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2, 4.0];

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -12,6 +12,7 @@ use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
 
 use super::coarse::{Pace, simple};
+use super::Frames;
 use super::play::Turn;
 use super::state::State;
 use super::{save, schema, systems};
@@ -23,7 +24,7 @@ const AT_ONCE: Duration = Duration::from_millis(60);
 /// After this, what moves is taken to stand still.
 const AT_REST: Duration = Duration::from_millis(150);
 /// How often more frames are looked for.
-const FOLLOWING: Duration = Duration::from_millis(500);
+const FOLLOWING: Duration = Duration::from_millis(250);
 /// Work that takes longer is told of.
 const LONG: Duration = Duration::from_secs(1);
 
@@ -34,12 +35,14 @@ pub(super) struct Guest {
     newest: AtomicU32,
     closed: AtomicBool,
     studio: Mutex<Studio>,
+    /// The sources, for files that are saved while something is drawn.
+    sources: Mutex<Session>,
     /// What was drawn last.
     pub seen: Mutex<Option<Seen>>,
     /// How many frames there are; those of a growing source become more.
-    frames: Mutex<Arc<AtomicUsize>>,
-    /// How many there were when it was looked at last.
-    counted: AtomicUsize,
+    frames: Mutex<Arc<Frames>>,
+    /// How many were known of when it was looked at last, and whether those were all.
+    counted: Mutex<(usize, bool)>,
     follows: bool,
 }
 
@@ -85,9 +88,10 @@ impl Guest {
     ///
     /// # Errors
     /// It cannot be.
-    pub fn new(mut session: Session, frames: Arc<AtomicUsize>, follows: bool) -> Result<Self> {
+    pub fn new(mut session: Session, frames: Arc<Frames>, follows: bool) -> Result<Self> {
         let state = State::new(session.scene().clone());
         let seen = session.survey(&crate::Quiet)?;
+        let sources = Mutex::new(session.share());
         let studio = Studio {
             session,
             paces: [Renderer::Spheres, Renderer::Surface, Renderer::Density]
@@ -101,8 +105,9 @@ impl Guest {
             state: Mutex::new(state),
             closed: AtomicBool::new(false),
             studio: Mutex::new(studio),
+            sources,
             seen: Mutex::new(Some(seen)),
-            counted: AtomicUsize::new(frames.load(Ordering::Acquire)),
+            counted: Mutex::new(frames.get()),
             frames: Mutex::new(frames),
             follows,
         })
@@ -118,7 +123,7 @@ impl Guest {
 
     /// How many frames there are.
     pub fn frame_count(&self) -> usize {
-        lock(&self.frames).load(Ordering::Acquire)
+        lock(&self.frames).get().0
     }
 
     /// Goes on with other sources, from their first frame.
@@ -130,10 +135,16 @@ impl Guest {
         scene.system.iter_mut().for_each(|system| system.source = rename(&system.source));
         let mut session = Session::open(scene, None)?;
         let frames = session.frames(&crate::Quiet)?;
+        // What is being drawn is of no use any more.
+        self.change(|state| {
+            state.changed();
+            Ok(())
+        })?;
         let mut studio = lock(&self.studio);
         studio.session = session.share();
-        *lock(&self.frames) = Arc::new(AtomicUsize::new(frames));
-        self.counted.store(frames, Ordering::Release);
+        *lock(&self.sources) = session;
+        *lock(&self.frames) = Frames::new(frames, true);
+        *lock(&self.counted) = (frames, true);
         self.change(|state| {
             state.rename(rename);
             state.go_to(0);
@@ -143,7 +154,7 @@ impl Guest {
 
     /// A session of its own, for files.
     fn own_session(&self, scene: Scene) -> Result<Session> {
-        let mut session = lock(&self.studio).session.share();
+        let mut session = lock(&self.sources).share();
         session.set_scene(scene)?;
         Ok(session)
     }
@@ -173,29 +184,42 @@ impl Guest {
         }
     }
 
-    /// Goes to the newest frame, if there are more than before and the last one was shown.
-    fn keep_up(&self, tell: &(dyn Fn(Value) + Sync)) {
-        let count = self.frame_count();
-        let before = self.counted.swap(count, Ordering::AcqRel);
-        if count == before {
-            return;
-        }
-        let last = |count: usize| u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX);
-        let gone = self.change(|state| {
-            if state.scene().image.frame >= last(before) && state.running.is_none() {
-                state.go_to(last(count));
-            }
-            Ok(())
-        });
-        if gone.is_ok() {
+    /// Tells if there are more frames than before. Who follows and has seen the last one gets the new last
+    /// one. Gives when to look again.
+    fn keep_up(&self, tell: &(dyn Fn(Value) + Sync)) -> Option<Duration> {
+        let now = lock(&self.frames).get();
+        let before = std::mem::replace(&mut *lock(&self.counted), now);
+        if now != before {
+            let last = |count: usize| u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX);
+            let _ = self.change(|state| {
+                let at_end = state.scene().image.frame >= last(before.0);
+                if self.follows && before.1 && at_end && state.running.is_none() {
+                    state.go_to(last(now.0));
+                }
+                Ok(())
+            });
             self.tell_scene(tell);
         }
+        (self.follows || !now.1).then_some(FOLLOWING)
     }
 
     fn tell_scene(&self, tell: &(dyn Fn(Value) + Sync)) {
         let mut message = self.scene_message();
         message.insert("is".into(), "scene".into());
         tell(Value::Object(message));
+    }
+
+    /// Finds out what there is to be seen, if that was let go of.
+    fn look_again(&self) {
+        if lock(&self.seen).is_some() {
+            return;
+        }
+        let mut studio = lock(&self.studio);
+        let scene = lock(&self.state).seen();
+        let surveyed = studio.session.set_scene(scene);
+        let seen = surveyed.and_then(|()| studio.session.survey(&crate::Quiet));
+        // What is wrong is told when it is drawn.
+        *lock(&self.seen) = seen.ok();
     }
 
     /// The message about the scene as it stands.
@@ -310,6 +334,7 @@ impl Guest {
 
 impl View for Guest {
     fn hello(&self) -> Map<String, Value> {
+        self.look_again();
         let mut hello = self.scene_message();
         hello.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         hello.insert("schema".into(), schema::schema());
@@ -336,8 +361,8 @@ impl View for Guest {
         if link.anew {
             studio.drawn = None;
         }
-        self.keep_up(tell);
-        let wait = self.go_on(tell).or(self.follows.then_some(FOLLOWING));
+        let look_again = self.keep_up(tell);
+        let wait = self.go_on(tell).or(look_again);
         let (scene, number, moving) = {
             let state = lock(&self.state);
             let moving = match (state.running.is_some(), state.moving()) {
@@ -385,14 +410,17 @@ impl View for Guest {
             let watch = Saving { closed: &self.closed };
             match file {
                 "scene.toml" => Ok(super::command::scene_text(&scene).into_bytes()),
-                "film.mp4" => {
-                    let session = self.own_session(scene)?;
-                    save::film(session, (wanted, self.frame_count()), &watch)
-                }
+                "film.mp4" => save::film(self.own_session(scene)?, wanted, &watch),
                 file => save::picture(&mut self.own_session(scene)?, file, &watch),
             }
         };
         made().map_err(|error: Error| error.to_string())
+    }
+
+    fn rest(&self) {
+        let mut studio = lock(&self.studio);
+        studio.session = studio.session.share();
+        *lock(&self.seen) = None;
     }
 
     fn close(&self) {

@@ -20,7 +20,7 @@ mod state;
 mod systems;
 
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -34,18 +34,53 @@ pub struct Gallery {
     /// What each client begins with.
     session: Arc<Mutex<Session>>,
     follows: bool,
-    frames: Arc<AtomicUsize>,
+    frames: Arc<Frames>,
+}
+
+/// How many frames there are.
+pub(crate) struct Frames {
+    count: AtomicUsize,
+    /// Whether they have all been counted.
+    known: AtomicBool,
+}
+
+impl Frames {
+    fn new(count: usize, known: bool) -> Arc<Self> {
+        Arc::new(Self { count: AtomicUsize::new(count), known: AtomicBool::new(known) })
+    }
+
+    /// How many are known of, and whether that is all.
+    fn get(&self) -> (usize, bool) {
+        (self.count.load(Ordering::Acquire), self.known.load(Ordering::Acquire))
+    }
+
+    fn set(&self, count: usize) {
+        self.count.store(count, Ordering::Release);
+        self.known.store(true, Ordering::Release);
+    }
 }
 
 impl Gallery {
-    /// Opens the sources of a scene.
+    /// Opens the sources of a scene. The frames of files are counted meanwhile: that may take long.
     ///
     /// # Errors
     /// As [`Session::open`].
     pub fn open(scene: Scene) -> Result<Self> {
-        let mut session = Session::open(scene, None)?;
-        let frames = session.frames(&Quiet)?;
-        let frames = Arc::new(AtomicUsize::new(frames));
+        let mut session = Session::open(scene.clone(), None)?;
+        let made = scene.system.iter().all(|system| crate::open::is_made(&system.source));
+        let frames = match made {
+            true => Frames::new(session.frames(&Quiet)?, true),
+            false => Frames::new(scene.image.frame as usize + 1, false),
+        };
+        let counted = frames.clone();
+        let count = move || {
+            // By readers of its own, as those of the session are in use.
+            let count = Session::open(scene, None).and_then(|mut own| own.frames(&Quiet));
+            counted.set(count.unwrap_or(1));
+        };
+        if !made && std::thread::Builder::new().name("count".into()).spawn(count).is_err() {
+            frames.set(session.frames(&Quiet)?);
+        }
         Ok(Self { session: Arc::new(Mutex::new(session)), follows: false, frames })
     }
 }
@@ -68,17 +103,20 @@ impl Gallery {
     pub fn follow(&mut self, every: Duration) -> std::io::Result<()> {
         self.follows = true;
         let (session, frames) = (Arc::downgrade(&self.session), self.frames.clone());
-        let mut before = Vec::new();
+        let stamps = |session: &Session| {
+            let sources = session.scene().system.iter().map(|s| &*s.source);
+            sources.map(Stamp::of).collect::<Vec<_>>()
+        };
+        let mut before = stamps(&lock(&self.session));
         let thread = std::thread::Builder::new().name("follow".into());
         thread.spawn(move || {
             while let Some(session) = session.upgrade() {
                 let session = lock(&session);
-                let sources = session.scene().system.iter().map(|s| &*s.source);
-                let now: Vec<_> = sources.map(Stamp::of).collect();
+                let now = stamps(&session);
                 if now != before {
                     // What is being written may not be fit to be read yet.
                     if let Ok(count) = session.refresh() {
-                        frames.store(count, Ordering::Release);
+                        frames.set(count);
                         before = now;
                     }
                 }

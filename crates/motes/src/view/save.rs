@@ -56,12 +56,8 @@ fn png(picture: &Picture, out: &mut Cursor<Vec<u8>>) -> Result<()> {
 }
 
 /// A film of the frames `first` to `last`, both included.
-pub(super) fn film(
-    mut session: Session,
-    (wanted, frames): (&Wanted, usize),
-    watch: &dyn Watch,
-) -> Result<Vec<u8>> {
-    let end = frames.max(1) - 1;
+pub(super) fn film(mut session: Session, wanted: &Wanted, watch: &dyn Watch) -> Result<Vec<u8>> {
+    let end = session.frames(watch)?.max(1) - 1;
     let first = number(wanted, "first")?.unwrap_or(0).min(end);
     let last = number(wanted, "last")?.unwrap_or(end).clamp(first, end);
     let shots = Shot::film(session.scene(), first..=last);
