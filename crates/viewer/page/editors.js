@@ -182,13 +182,19 @@ function color({ id, name, optional, empty, send }) {
 
 /** @param {Task} task @returns {Editor} */
 function text({ id, name, empty, optional, send }) {
+  // A list of names is text with commas.
+  let list = false;
+  const names = () => input.value.split(',').map((/** @type {string} */ w) => w.trim()).filter(Boolean);
   const input = h('input', {
     id, type: 'text', 'aria-label': name, placeholder: empty ?? '', spellcheck: 'false', autocomplete: 'off',
-    onchange: () => send(input.value === '' && optional ? null : input.value, true),
+    onchange: () => send(list ? names() : input.value === '' && optional ? null : input.value, true),
   });
   return {
     element: input,
-    show: (value) => { if (document.activeElement !== input) input.value = String(value ?? ''); },
+    show: (value) => {
+      list = Array.isArray(value);
+      if (document.activeElement !== input) input.value = list ? value.join(', ') : String(value ?? '');
+    },
   };
 }
 

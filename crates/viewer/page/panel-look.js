@@ -16,7 +16,7 @@ class Look extends Panel {
 
   plan() {
     const by = store.get(store.mine('color.by'));
-    return JSON.stringify([by, store.get('renderer'), store.get('surface.mode')]);
+    return JSON.stringify([by, store.get('renderer'), store.get('surface.mode'), store.get('cue.on')]);
   }
 
   build() {
@@ -32,8 +32,26 @@ class Look extends Panel {
       renderer === 'surface' && fold('Liquid', true, this.#surface()),
       renderer === 'density' && fold('Liquid', true,
         ['resolution', 'support', 'threshold', 'depth', 'ior', 'absorption', 'environment'].map((n) => field(`density.${n}`, n === 'support' ? { slide: [1, 12] } : n === 'ior' ? { slide: [1, 2.5] } : {}))),
-      store.has('cue') && fold('Depth and edges', false, reach(/** @type {any} */ (store.field('cue')).shape, 'cue').filter(({ field: f }) => f.shape.kind !== 'table').map(({ path }) => field(path))),
+      store.has('cue.on') && fold('Edges and depth', false, this.#cues()),
     ];
+  }
+
+  /** Cues: which are on, and how strong these are. */
+  #cues() {
+    const on = this.#on();
+    const words = ['edges', 'depth', 'halo', 'rim', 'seam', 'sprite'];
+    const turn = (/** @type {string} */ w) => store.change({ 'cue.on': (on.includes(w) ? on.filter((o) => o !== w) : [...on, w]).join(', ') });
+    const shown = reach(/** @type {any} */ (store.field('cue')).shape, 'cue').filter(({ field: f }) => on.some((w) => f.name === w || f.name.startsWith(`${w}_`)));
+    return [
+      h('div', { class: 'chips', role: 'group', 'aria-label': 'Cues' }, words.map((w) => h('button', { class: 'chip', 'aria-pressed': String(on.includes(w)), onclick: () => turn(w) }, w))),
+      shown.map(({ path, field: f }) => field(path, words.includes(f.name) ? { slide: [0, 1], label: `${f.name.charAt(0).toUpperCase()}${f.name.slice(1)}, strength` } : {})),
+      field('cue.structure'),
+    ];
+  }
+
+  /** The cues that are on. @returns {string[]} */
+  #on() {
+    return String(store.get('cue.on') ?? '').split(/[,\s]+/).filter(Boolean);
   }
 
   #surface() {

@@ -39,6 +39,7 @@ class Timeline extends Part {
       h('div', { class: 'group options' }, this.loop, this.speed, h('label', { for: 'drop', title: 'Leave frames out rather than fall behind' }, this.drop, 'in time')));
     this.replaceChildren(this.live, this.film);
     this.listen(store, 'scene systems', () => this.#update());
+    this.listen(store, 'hello', () => this.#begin());
     this.listen(store, 'frame', (e) => this.#frame(e.detail));
     this.listen(store, 'ahead', (e) => this.#ahead(e.detail.frames));
     this.listen(store, 'toggle-play', () => this.#toggle());
@@ -55,7 +56,6 @@ class Timeline extends Part {
   /** Pause, step, start again, and how fine, of a simulation. */
   #live() {
     this.run = h('button', { class: 'plain icon', title: 'Pause or go on', 'aria-label': 'Pause or go on', onclick: () => this.#run() }, icon('pause'));
-    this.running = true;
     const particles = h('input', {
       type: 'range', min: Math.log(500), max: Math.log(2e6), step: 'any', 'aria-label': 'Particles of the simulation',
       oninput: () => { this.fine.textContent = count(round(particles.value)); },
@@ -68,20 +68,20 @@ class Timeline extends Part {
     return h('div', { class: 'live', hidden: true },
       h('span', { class: 'label' }, 'Simulation'),
       h('div', { class: 'group' }, this.run,
-        h('button', { class: 'plain icon', title: 'One frame on', 'aria-label': 'One frame of the simulation on', onclick: () => { this.#stopped(); live('step'); } }, icon('step')),
+        h('button', { class: 'plain icon', title: 'One frame on', 'aria-label': 'One frame of the simulation on', onclick: () => live('step') }, icon('step')),
         h('button', { class: 'plain icon', title: 'From the beginning', 'aria-label': 'Simulation from the beginning', onclick: () => live('restart') }, icon('restart'))),
       h('label', { class: 'fine' }, 'Particles', particles, this.fine));
   }
 
   #run() {
-    this.running = !this.running;
-    change(this.run, this.running ? 'pause' : 'play');
-    store.ask('live', { action: this.running ? 'run' : 'pause' });
+    store.ask('live', { action: this.playing ? 'pause' : 'run' });
   }
 
-  #stopped() {
-    this.running = false;
-    change(this.run, 'play');
+  /** A simulation that is looked at for the first time runs. */
+  #begin() {
+    const fresh = !store.undo && !this.playing && !store.get('image.frame') && !location.hash;
+    if (fresh && !this.begun && store.systems.some((s) => s.live)) this.#run();
+    this.begun = true;
   }
 
   get frames() {
@@ -104,7 +104,7 @@ class Timeline extends Part {
     }
     this.slider.max = Math.max(0, this.frames - 1);
     this.of.textContent = `of ${count(this.frames)}`;
-    change(this.play, this.playing ? 'pause' : 'play');
+    for (const button of [this.play, this.run]) change(button, this.playing ? 'pause' : 'play');
     this.play.setAttribute('aria-pressed', String(this.playing));
     if (!this.playing) this.#at(store.get('image.frame') ?? 0);
   }
@@ -145,8 +145,8 @@ class Timeline extends Part {
   }
 
   #toggle() {
-    if (this.frames > 1) this.#send(!this.playing);
-    else if (!this.live.hidden) this.#run();
+    if (!this.live.hidden) this.#run();
+    else if (this.frames > 1) this.#send(!this.playing);
   }
 
   /** @param {boolean} on */

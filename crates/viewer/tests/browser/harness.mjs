@@ -1,5 +1,6 @@
 // What the browser tests share: a running `motes view`, a browser, and words for what is to be seen.
 //
+// They run by `cargo test -p motes --test browser`, or alone by `node --test crates/viewer/tests/browser/*.test.mjs`:
 // MOTES names the program, MOTES_BROWSER a folder that has playwright-core in its node_modules, CHROMIUM the
 // browser (else it is looked for in PATH).
 import { execFileSync, spawn } from 'node:child_process';
@@ -16,7 +17,7 @@ const MOTES = process.env.MOTES ?? 'motes';
 const ROOT = path.resolve(import.meta.dirname, '../../../..');
 
 /** Milliseconds that something may take on a slow machine. */
-export const PATIENCE = 30_000;
+export const PATIENCE = Number(process.env.MOTES_PATIENCE_MS ?? 30_000);
 
 /** A file of the repository's `data/`. */
 export const data = (name) => path.join(ROOT, 'data', name);
@@ -98,6 +99,9 @@ function words(page) {
   /** Waits for the exact picture of the newest state; gives its hash. */
   async function exact() {
     const rested = async () => {
+      // A picture from before the window had its size does not count.
+      const sized = await canvas.evaluate((c) => Math.abs(c.width - c.clientWidth * devicePixelRatio) < 1);
+      if (!sized) return '';
       const [exactly, hash] = [await canvas.getAttribute('data-exact'), await canvas.getAttribute('data-hash')];
       const [state, idle] = [Number(await canvas.getAttribute('data-state')), await store('!store.pending && store.inFlight === 0 && store.state')];
       return exactly === 'true' && idle !== false && state === idle ? hash : '';
@@ -112,7 +116,7 @@ function words(page) {
     /** The middle of the picture and its size, in the window. */
     async middle() {
       const box = await canvas.boundingBox();
-      return { x: box.x + box.width / 2, y: box.y + box.height / 2, ...box, left: box.x, top: box.y };
+      return { ...box, x: box.x + box.width / 2, y: box.y + box.height / 2, left: box.x, top: box.y };
     },
     /** Drags in the picture from its middle. */
     async drag(dx, dy, { button = 'left', from = [0, 0] } = {}) {

@@ -17,7 +17,7 @@ function dice(seed) {
   };
 }
 
-test('random use', async (t) => {
+test('random use', { timeout: 180_000 }, async (t) => {
   const server = await serve(data('1l2y.pdb'));
   t.after(() => server.stop());
   const seen = await visit(server.url, { width: 900, height: 600 });
