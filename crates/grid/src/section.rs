@@ -60,7 +60,12 @@ impl Sections {
     /// Bytes it holds.
     pub fn bytes(&self) -> usize {
         let visible = self.base.iter().chain(&self.shown).map(Visibility::bytes).sum::<usize>();
-        visible + self.gone.iter().map(Counters::bytes).sum::<usize>()
+        visible + self.counter_bytes()
+    }
+
+    /// Bytes of the blocks' counters.
+    pub fn counter_bytes(&self) -> usize {
+        self.gone.iter().map(Counters::bytes).sum()
     }
 
     /// Goes over to the cuts of `clip`: adds, moves, takes back any of them. `grids` are those that this was

@@ -104,6 +104,11 @@ impl Pass {
         self.sections.visible()
     }
 
+    /// What would be seen of them without cuts.
+    pub fn all(&self) -> &[Visibility] {
+        self.sections.uncut()
+    }
+
     /// Where rays meet them; `None`: everywhere.
     pub fn clip(&self) -> Option<&Clip> {
         (!self.exact.is_empty()).then_some(&self.exact)

@@ -75,7 +75,7 @@ impl Drawing<'_> {
         };
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let entries = Entries::new(others);
+        let entries = Entries::new(others, &scene.light);
         let boxes = others.iter().flat_map(|l| l.boxes(origin));
         let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let corners = boxes.fold(nothing, |[low, high], b| {
@@ -123,11 +123,12 @@ impl Drawing<'_> {
         let Self { loaded, resolved, origin, .. } = *self;
         let level = Level::new();
         stats.simd = instruction_set(level).into();
-        let entries = Entries::new(loaded);
+        let entries = Entries::new(loaded, &self.scene.light);
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
         let systems = &entries.spheres;
-        let view = View { rays: &rays, systems, paint: &entries, lights: &lights };
+        let casters = &entries.casters;
+        let view = View { rays: &rays, systems, paint: &entries, lights: &lights, casters };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),

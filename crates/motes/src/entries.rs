@@ -1,7 +1,8 @@
 //! What tracers take of several systems: an entry for each pass of each.
 
 use glam::Vec3;
-use motes_spheres::Spheres;
+use motes_scene::Light;
+use motes_spheres::{Cap, Spheres};
 
 use crate::system::Loaded;
 
@@ -9,16 +10,22 @@ use crate::system::Loaded;
 pub(crate) struct Entries<'a> {
     loaded: &'a [Loaded],
     pub spheres: Vec<Spheres<'a>>,
+    /// What keeps light away instead, if that is said.
+    pub casters: Vec<Spheres<'a>>,
     /// The system of each.
     of: Vec<usize>,
 }
 
 impl<'a> Entries<'a> {
-    pub fn new(loaded: &'a [Loaded]) -> Self {
-        let mut entries = Self { loaded, spheres: Vec::new(), of: Vec::new() };
+    pub fn new(loaded: &'a [Loaded], light: &Light) -> Self {
+        let (spheres, casters, of) = (Vec::new(), Vec::new(), Vec::new());
+        let mut entries = Self { loaded, spheres, casters, of };
         for (i, system) in loaded.iter().enumerate() {
             entries.spheres.extend(system.spheres());
             entries.of.resize(entries.spheres.len(), i);
+            if light.uncut {
+                entries.casters.extend(system.uncut_spheres());
+            }
         }
         entries
     }
@@ -36,6 +43,11 @@ impl motes_spheres::Paint for Entries<'_> {
 
     fn uniform(&self, entry: u16) -> Option<Vec3> {
         self.system(entry).paint.uniform()
+    }
+
+    fn cap(&self, entry: u16, index: u32, cap: Cap) -> Option<Vec3> {
+        let system = self.system(entry);
+        system.caps.color(index, cap, || system.paint.color(index))
     }
 
     fn opacity(&self, entry: u16, index: u32) -> f32 {

@@ -13,6 +13,7 @@
 
 mod annotate;
 pub mod bench;
+mod caps;
 mod cut;
 mod density;
 mod drawing;
@@ -40,7 +41,7 @@ pub use error::{Error, Result};
 pub use info::{BoundsInfo, BoxInfo, Info, PropertyInfo, Range, info};
 pub use motes_film::{Film, FilmError, Settings as FilmSettings};
 pub use motes_frame::{Frame, Rgba8};
-pub use motes_scene::{Moment, Scene, SceneError};
+pub use motes_scene::{Moment, Scene, SceneError, Section};
 pub use motes_sph::Stats as SimulationStats;
 pub use open::{BUILT_IN, built_in_scene, is_picture, open, open_with, read_scene};
 pub use picture::Picture;

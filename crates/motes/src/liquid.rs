@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
 use motes_grid::{Clip, Visibility};
 use motes_scene::surface::{self, Culling, Filtering};
+use motes_spheres::Cap;
 use motes_scene::{Beyond, Bounds, CameraView, Environment, Lights, Resolved, Scene};
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Medium, Mode, Occlusion, Optics, Paint,
@@ -19,6 +20,7 @@ use motes_surface::{
 };
 
 use crate::environment::{FLOOR_FILL, WATER, environment};
+use crate::caps::Caps;
 use crate::cut::Visible;
 use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
@@ -117,12 +119,14 @@ pub(crate) struct Liquid<'a> {
 pub(crate) struct Opened<'a> {
     clip: &'a Clip,
     nearest: &'a Nearest<'a>,
+    caps: &'a Caps,
 }
 
 impl<'a> Opened<'a> {
     /// The cuts of a liquid, if there are any.
     pub fn of(system: &'a Loaded, nearest: &'a Option<Nearest<'a>>) -> Option<Self> {
-        system.clip().zip(nearest.as_ref()).map(|(clip, nearest)| Self { clip, nearest })
+        let cuts = system.clip().zip(nearest.as_ref());
+        cuts.map(|(clip, nearest)| Self { clip, nearest, caps: &system.caps })
     }
 }
 
@@ -143,7 +147,7 @@ impl Liquid<'_> {
             false => Err(Error::Cancelled),
         };
         go_on(0)?;
-        let params = self.params(layers || self.painted());
+        let params = self.params(layers || self.painted() || self.opened.is_some());
         let boundary = self.boundary(&params, stats);
         go_on(1)?;
         let optics = self.optics(bounds);
@@ -239,7 +243,7 @@ impl Liquid<'_> {
             shown: self.scene.surface.environment != "none" && !self.scene.image.transparent,
             shadow: shadow.as_ref(),
             occlusion: occlusion.as_ref(),
-            paint: self.painted().then_some(self as &dyn Paint),
+            paint: (self.painted() || self.opened.is_some()).then_some(self as &dyn Paint),
             color: Vec3::from(self.scene.surface.color.linear()),
         };
         let media = media.iter().map(|(surfaces, ior)| Medium { surfaces, ior: *ior });
@@ -391,7 +395,7 @@ impl Liquid<'_> {
             stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
         }
         let mut surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
-        if let Some(Opened { clip, nearest }) = self.opened {
+        if let Some(Opened { clip, nearest, .. }) = self.opened {
             let particle = |point| nearest.particle(point).unwrap_or(Spans::NO_PARTICLE);
             surfaces = surfaces.cut(clip, &particle);
             timed.lap("cut");
@@ -460,6 +464,15 @@ impl<'a> Laps<'a> {
 impl Paint for Liquid<'_> {
     fn color(&self, particle: u32) -> Option<Vec3> {
         self.painted().then(|| self.matter.paint.color(particle))
+    }
+
+    fn cap(&self, owner: u16, point: Vec3, particle: Option<u32>) -> Option<Vec3> {
+        let particle = particle?;
+        let outside = || match self.painted() {
+            true => self.matter.paint.color(particle),
+            false => Vec3::from(self.scene.surface.color.linear()),
+        };
+        self.opened?.caps.color(particle, Cap { owner, point }, outside)
     }
 }
 

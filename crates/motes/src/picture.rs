@@ -4,7 +4,9 @@ use std::path::Path;
 
 use motes_frame::{Frame, PngOptions, Rgba8, Transparency, save, write_exr, write_npz, write_png};
 
-use crate::Result;
+use motes_scene::{CameraView, Section};
+
+use crate::{Error, Result};
 use crate::stats::Stats;
 
 /// A finished picture.
@@ -18,6 +20,8 @@ pub struct Picture {
     pub stats: Stats,
     /// The scene it shows, as TOML.
     pub scene: String,
+    /// From where it is seen.
+    pub view: CameraView,
     /// Whether the background is left out.
     pub transparent: bool,
 }
@@ -35,6 +39,21 @@ impl Picture {
             "npz" => self.save_layers(path),
             _ => self.save_png(path),
         }
+    }
+
+    /// The section that a line on the picture means, drawn from one point to another (column, row, in
+    /// pixels): through what is seen at the first, keeping what lies towards the second.
+    ///
+    /// # Errors
+    /// The picture has no layers, the points lie outside it or at the same place, or nothing is seen between.
+    pub fn section_of_drag(&self, from: [f64; 2], to: [f64; 2]) -> Result<Section> {
+        let depth = self.raw.depth();
+        let depth = depth.ok_or_else(|| Error::Usage("drag: the picture has no depth".into()))?;
+        let seen = |x: u32, y: u32| {
+            let at = y as usize * self.raw.width() + x as usize;
+            depth.get(at).map(|distance| f64::from(*distance))
+        };
+        Ok(self.view.section_of_drag((from.into(), to.into()), &seen)?)
     }
 
     /// What is shown, eight bits a channel, as a [`crate::Film`] takes it.

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec3;
 use motes_scene::{Beyond, Environment, Lights, Sight};
-use motes_spheres::{Counts, Packet, Paint, Spheres, trace};
+use motes_spheres::{Counts, Met, Packet, Paint, Spheres, trace};
 
 /// Rays that are traced together.
 const TOGETHER: usize = 64;
@@ -65,15 +65,15 @@ impl<'a> Scenery<'a> {
     /// The light of the sphere that ray `i` of a packet meets first, and its distance.
     fn light(&self, packet: &Packet, i: usize) -> Option<(Vec3, f32)> {
         let (distance, system, slot) = packet.hit(i)?;
-        let (grid, place) = self.others.systems[system as usize].locate(slot);
-        let direction = packet.direction_of(i);
-        let point = packet.origin_of(i) + direction * distance;
-        let outward = (point - grid.center(place)).normalize_or(-direction);
-        let normal = if outward.dot(direction) < 0.0 { outward } else { -outward };
+        let ray = (packet.origin_of(i), packet.direction_of(i));
+        let met = self.others.systems[system as usize].surface(slot, ray, distance);
+        let Met { point, normal, index, .. } = met;
         let Lights { key, ambient, .. } = *self.lights;
         let cosine = normal.dot(key.seen_from(point).direction).max(0.0);
         let light = key.color * cosine + self.lights.fill(normal) + ambient;
-        Some((self.others.paint.color(system, grid.index(place)) * light, distance))
+        let inside = met.cap.and_then(|cap| self.others.paint.cap(system, index, cap));
+        let color = inside.unwrap_or_else(|| self.others.paint.color(system, index));
+        Some((color * light, distance))
     }
 }
 

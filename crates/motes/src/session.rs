@@ -8,7 +8,7 @@ use motes_frame::{Background, Curve, Frame, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series, SimulationBox};
 use motes_scene::{
-    Bounds, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Show,
+    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Section, Show,
 };
 
 use crate::annotate::{Annotated, annotations};
@@ -275,6 +275,7 @@ impl Session {
             shown,
             stats,
             scene: drawn.scene.to_toml(),
+            view: drawn.resolved.view,
             transparent: self.scene.image.transparent,
         })
     }
@@ -468,6 +469,10 @@ impl Session {
             let still = own > 0 && self.series.len() > 1 && series.frames(&report)? == 1;
             let own = if still { 0 } else { own };
             let mut wanted = wanted(system);
+            let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
+            if self.scene.sections_of(i).any(|(_, section)| by_property(section)) {
+                wanted = Wanted::All;
+            }
             let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
             if masked && let Wanted::Only(columns) = &mut wanted {
                 columns.push(names::PARTICLE_MASK.into());

@@ -10,13 +10,15 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, RadiusClasses, Resolution};
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Coloring, Scene, Section, Show, System};
+use motes_scene::{Bounds, Coloring, Scene, Section, Show, System};
 
 use crate::annotate::box_shown;
+use crate::caps::Caps;
 use crate::cut::{Body, Keep, Visible};
+use crate::memo::Same;
 use crate::paint::Paint;
 use crate::radius::Spacing;
-use crate::system::{Loaded, asks_for_positions, visibility};
+use crate::system::{Loaded, asks_for_positions, boxes, visibility};
 use crate::{Result, radius};
 
 /// The stages of one system.
@@ -30,6 +32,7 @@ pub(crate) struct Stages {
     forgotten: bool,
     paint: Option<(PaintKey, Arc<Paint>)>,
     visible: Option<(VisibleKey, CutKey, Arc<Visible>)>,
+    caps: Option<((Vec<Section>, Coloring, Same<Visible>), Arc<Caps>)>,
 }
 
 /// What grids depend on besides particles.
@@ -96,14 +99,14 @@ impl Stages {
             spacing: Spacing::of(scene, number as usize),
             shift: DVec3::from_array(particles.origin) - origin,
         };
-        self.build(&key, spare, (&mut particles, system));
+        self.build(&key, spare, (&mut particles, (scene, system)));
         self.particles = Some(particles.clone());
         let paint = self.painted(&particles, PaintKey {
             color: system.color.clone(),
             opacity: system.opacity,
             range,
         }, system)?;
-        self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, system));
+        self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, (scene, system)));
         let Some((_, classes)) = &self.grids else { return Err(crate::Error::Cancelled) };
         let classes = classes.clone();
         let number_of = usize::from(number);
@@ -116,7 +119,8 @@ impl Stages {
         };
         let visible = self.seen(body, scene)?;
         let sim_box = self.boxed(&particles, scene.overlay.r#box);
-        Ok(Loaded { number, particles, sim_box, classes, visible, paint })
+        let caps = self.capped((&particles, &classes), (scene, number_of), (&visible, origin))?;
+        Ok(Loaded { number, particles, sim_box, classes, visible, paint, caps })
     }
 
     /// Forgets what was made of other particles; gives the memory of their grids.
@@ -133,7 +137,7 @@ impl Stages {
         &mut self,
         key: &GridKey,
         mut memory: RadiusClasses,
-        (particles, system): (&mut Arc<Particles>, &System),
+        (particles, (scene, system)): (&mut Arc<Particles>, (&Scene, &System)),
     ) {
         if self.grids.as_ref().is_some_and(|(had, _)| had == key) {
             return;
@@ -147,7 +151,7 @@ impl Stages {
             resolution: Resolution::CellsPerParticle(key.lambda as f32),
             block_cells: key.block,
         };
-        let keeps = asks_for_positions(particles, system);
+        let keeps = asks_for_positions(particles, (scene, system));
         let own = Arc::get_mut(particles).filter(|_| !keeps);
         let mut positions = match own.map(Particles::take_positions) {
             Some(positions) => positions.into(),
@@ -185,7 +189,7 @@ impl Stages {
         &mut self,
         forget: bool,
         key: &GridKey,
-        of: (&mut Arc<Particles>, &System),
+        of: (&mut Arc<Particles>, (&Scene, &System)),
     ) {
         let some = self.grids.iter().any(|(_, c)| c.grids.iter().any(|g| !g.crowded.is_empty()));
         if (forget && !some) || (!forget && !self.forgotten) {
@@ -222,6 +226,27 @@ impl Stages {
         }
         self.visible = Some((key, cuts, visible.clone()));
         Ok(visible)
+    }
+
+    /// The colours of caps.
+    fn capped(
+        &mut self,
+        (particles, classes): (&Arc<Particles>, &RadiusClasses),
+        (scene, number): (&Scene, usize),
+        (visible, origin): (&Arc<Visible>, DVec3),
+    ) -> Result<Arc<Caps>> {
+        let sections = scene.sections_of(number).map(|(_, section)| section.clone()).collect();
+        let key = (sections, scene.system[number].color.clone(), Same(visible.clone()));
+        match &self.caps {
+            Some((had, caps)) if *had == key => Ok(caps.clone()),
+            _ => {
+                let seen = boxes(classes, visible.all(), origin).into_iter().reduce(Bounds::union);
+                let diagonal = seen.map_or(1.0, |bounds| bounds.diagonal());
+                let caps = Arc::new(Caps::new((scene, number), particles, diagonal)?);
+                self.caps = Some((key, caps.clone()));
+                Ok(caps)
+            }
+        }
     }
 
     fn boxed(&mut self, particles: &Particles, show: Show) -> Option<SimulationBox> {

@@ -7,9 +7,10 @@ use motes_grid::{BlockRanges, Clip, Filter, Grid, RadiusClasses, Seen, Visibilit
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, ColorBy, Scene, System};
+use motes_scene::{Bounds, CapColor, ColorBy, Scene, System};
 use motes_spheres::Spheres;
 
+use crate::caps::Caps;
 use crate::cut::{Keep, Visible};
 use crate::paint::{Paint, category_column, find_property, kinds_of};
 use crate::radius::{Rule, Spacing};
@@ -26,6 +27,8 @@ pub(crate) struct Loaded {
     pub classes: Arc<RadiusClasses>,
     pub visible: Arc<Visible>,
     pub paint: Arc<Paint>,
+    /// The colours of what the sections lay open.
+    pub caps: Arc<Caps>,
 }
 
 impl Loaded {
@@ -82,20 +85,32 @@ impl Loaded {
         })
     }
 
+    /// As [`Loaded::spheres`], without cuts.
+    pub fn uncut_spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
+        self.visible.passes().iter().map(|pass| Spheres::new(&self.classes, pass.all()))
+    }
+
     /// Boxes around what is visible, with radii, in world coordinates.
     pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
-        let mut boxes = Vec::new();
-        for (grid, visible) in self.classes.grids.iter().zip(self.visible()) {
-            let blocks = 0..grid.blocks.len() - 1;
-            let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
-            boxes.extend(
-                seen.map(|(low, high)| {
-                    Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)
-                }),
-            );
-        }
-        boxes
+        boxes(&self.classes, self.visible(), origin)
     }
+}
+
+/// Boxes around what is `visible`, with radii, in world coordinates.
+pub(crate) fn boxes(
+    classes: &RadiusClasses,
+    visible: &[Visibility],
+    origin: DVec3,
+) -> Vec<Bounds> {
+    let mut boxes = Vec::new();
+    for (grid, visible) in classes.grids.iter().zip(visible) {
+        let blocks = 0..grid.blocks.len() - 1;
+        let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
+        boxes.extend(seen.map(|(low, high)| {
+            Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)
+        }));
+    }
+    boxes
 }
 
 /// Sets `seen`, by index, of the particles that are `visible`.
@@ -158,14 +173,19 @@ pub(crate) fn visibility(
 }
 
 /// Whether colours or what is visible go by the particles' positions.
-pub(crate) fn asks_for_positions(particles: &Particles, system: &System) -> bool {
+pub(crate) fn asks_for_positions(particles: &Particles, (scene, system): (&Scene, &System)) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {
         ColorBy::Property(name) => by_position(name),
         _ => false,
     };
+    let caps = scene.section.iter().any(|section| match &section.cap {
+        CapColor::Property(name) => by_position(name),
+        _ => false,
+    });
     color
+        || caps
         || !system.r#where.trim().is_empty()
         || system.filter.iter().any(|filter| by_position(&filter.property))
 }

@@ -583,7 +583,7 @@ fn bench_refuses_what_makes_no_sense() {
         (&["surface", "--source", "demo:dam:9", "--set", "surface.gap=-1"], "surface.gap"),
         (&["density", "--stages", "table2"], "'table2'"),
         (&["density", "--source", "demo:dam:9", "--stages", "ao16"], "'ao16'"),
-        (&["sections"], "not in this version"),
+        (&["sections", "--stages", "table2"], "'table2'"),
     ] {
         let said = fails(&folder, &[&["bench"], args].concat(), 2);
         assert!(said.contains(word), "{args:?}: {said}");

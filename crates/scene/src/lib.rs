@@ -25,6 +25,7 @@ mod color;
 mod color_points;
 mod colormap;
 pub mod density;
+mod drag;
 mod elements;
 mod environment;
 mod error;

@@ -142,6 +142,15 @@ impl Setting for CapColor {
 }
 
 impl Section {
+    /// As TOML that may follow that of a scene.
+    pub fn to_toml(&self) -> String {
+        #[derive(Serialize)]
+        struct Only<'a> {
+            section: [&'a Section; 1],
+        }
+        toml::to_string(&Only { section: [self] }).unwrap_or_default()
+    }
+
     /// Whether it cuts the system at place `index`.
     pub fn cuts(&self, index: usize, system: &System) -> bool {
         self.on && (self.system.allow(&index.to_string()) || self.system.allow(&system.name))

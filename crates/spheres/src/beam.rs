@@ -8,8 +8,9 @@
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_grid::{Grid, Seen};
+use motes_grid::{Clip, Grid, Seen};
 
+use crate::clip::Stretches;
 use crate::intersect::{bits, radii_at, sixteen_centers};
 use crate::lanes::Lanes;
 use crate::near::{Boxes, Near, Shelves};
@@ -35,6 +36,9 @@ pub(crate) struct Beam {
     /// nothing lies in.
     low: [Lanes<f32>; 2],
     high: [Lanes<f32>; 2],
+    /// What of the rays is left, where the spheres at hand are cut; and whose cuts these are, plus one.
+    stretches: Stretches,
+    cut: usize,
 }
 
 /// The shape of a beam: constants for sixteen boxes or spheres at a time.
@@ -69,6 +73,8 @@ impl Beam {
             reach: Lanes::new(LOST, MOST + LANES),
             low: bounds(f32::INFINITY),
             high: bounds(f32::NEG_INFINITY),
+            stretches: Stretches::new(),
+            cut: 0,
         }
     }
 
@@ -98,11 +104,17 @@ impl Beam {
             self.origin[axis][self.rays..lanes].fill(first);
         }
         let shape = self.shape(simd, direction, reach);
+        self.cut = 0;
         let mut live = lanes / LANES;
         for (_, place, wanted) in &near.groups {
             let boxes = &shelves.boxes[*place as usize];
             let spheres = &systems[boxes.of.0 as usize];
             let grid = &spheres.classes.grids[boxes.of.1 as usize];
+            let cut = if spheres.clip.is_some() { usize::from(boxes.of.0) + 1 } else { 0 };
+            if let Some(clip) = spheres.clip.filter(|_| cut != self.cut) {
+                self.clip_to(simd, clip, direction);
+            }
+            self.cut = cut;
             let visible = &spheres.visible[boxes.of.1 as usize];
             let mut meets = 0;
             for part in (0..GROUP).step_by(LANES) {
@@ -121,6 +133,24 @@ impl Beam {
                     return;
                 }
             }
+        }
+    }
+
+    /// Finds what a clip leaves of the rays.
+    #[inline(always)]
+    fn clip_to<S: Simd>(&mut self, simd: S, clip: &Clip, direction: Vec3) {
+        let vectors = self.rays.div_ceil(LANES);
+        self.stretches.begin(clip, vectors);
+        let direction = [
+            f32x16::splat(simd, direction.x),
+            f32x16::splat(simd, direction.y),
+            f32x16::splat(simd, direction.z),
+        ];
+        for vector in 0..vectors {
+            let [x, y, z] = &self.origin;
+            let at = vector * LANES;
+            let origin = [load(simd, x, at), load(simd, y, at), load(simd, z, at)];
+            self.stretches.find(simd, clip, vector, [origin, direction]);
         }
     }
 
@@ -262,7 +292,10 @@ impl Beam {
             f32x16::splat(simd, direction.y),
             f32x16::splat(simd, direction.z),
         ];
-        let blocked = blocks(simd, oc, d, (radius, reach));
+        let blocked = match self.cut {
+            0 => blocks(simd, oc, d, (radius, reach)),
+            _ => self.stretches.blocks(simd, vector, (oc, d), (radius, reach)),
+        };
         if !blocked.any_true() {
             return 0;
         }

@@ -16,7 +16,8 @@ use crate::lanes::Lanes;
 use crate::occlude::{Work, lift};
 use crate::packet::Packet;
 use crate::tile::TILE_RAYS;
-use crate::traverse::{Counts, trace, trace_through};
+use crate::shade::color_of;
+use crate::traverse::{Counts, Met, trace, trace_through};
 
 /// Rays of a packet: 8 × 8.
 const PACKET: usize = 64;
@@ -96,15 +97,11 @@ impl Bounce {
         let mut waiting = Vec::with_capacity(PACKET);
         for (i, ray) in own.iter().enumerate() {
             let Some((distance, system, slot)) = packet.hit(i) else { continue };
-            let (grid, place) = work.view.systems[system as usize].locate(slot);
-            let (center, radius, index) =
-                (grid.center(place), grid.radius_at(place), grid.index(place));
-            let (origin, direction) = (packet.origin_of(i), packet.direction_of(i));
-            let position = origin + direction * distance;
-            let outward = (position - center).normalize_or(-direction);
-            let normal = if outward.dot(direction) < 0.0 { outward } else { -outward };
+            let ray_of = (packet.origin_of(i), packet.direction_of(i));
+            let met = work.view.systems[system as usize].surface(slot, ray_of, distance);
+            let Met { point: position, normal, radius, index, .. } = met;
             let opacity = if translucent { paint.opacity(system, index) } else { 1.0 };
-            let albedo = paint.color(system, index) * opacity;
+            let albedo = color_of(paint, system, (index, met.cap)) * opacity;
             add(light, *ray, albedo * (lights.fill(normal) + lights.ambient));
             let key = lights.key;
             let toward = key.seen_from(position);
@@ -122,9 +119,9 @@ impl Bounce {
             }
         }
         if !shadow.is_empty() && translucent {
-            trace_through(simd, shadow, work.view.systems, paint, counts);
+            trace_through(simd, shadow, work.view.casting(), paint, counts);
         } else if !shadow.is_empty() {
-            trace(simd, shadow, work.view.systems, counts);
+            trace(simd, shadow, work.view.casting(), counts);
         }
         for (i, Waiting { ray, key }) in waiting.into_iter().enumerate() {
             let open = match (translucent, shadow.is_blocked(i)) {

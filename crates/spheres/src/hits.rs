@@ -1,14 +1,15 @@
 //! The surfaces that the rays of a tile have hit first.
 
-use fearless_simd::{f32x4, f32x8, f32x16, prelude::*, u32x16};
+use fearless_simd::{f32x4, f32x8, f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::Vec3;
 use motes_grid::{Grid, Particle, Radii};
 
+use crate::clip::{Stretches, cap_normals};
 use crate::intersect::{columns, transposed};
 use crate::lanes::Lanes;
 use crate::packet::{LANES, NO_SLOT, Surface};
-use crate::render::Center;
+use crate::render::{Cap, Center};
 use crate::tile::{RayTile, TILE_RAYS};
 use crate::traverse::Spheres;
 
@@ -25,6 +26,12 @@ pub(crate) struct Hits {
     pub radius: Lanes<f32>,
     /// Its index in the file's order.
     pub index: Lanes<u32>,
+    /// Where a cut has laid the surface open, the owner of the face plus one; else 0.
+    pub cap: Lanes<u32>,
+    /// Whether it has anywhere.
+    pub capped: bool,
+    /// What of a block's rays is left.
+    stretches: Stretches,
 }
 
 impl Hits {
@@ -36,6 +43,9 @@ impl Hits {
             normal: zeros(),
             radius: Lanes::new(0.0, TILE_RAYS),
             index: Lanes::new(0, TILE_RAYS),
+            cap: Lanes::new(0, TILE_RAYS),
+            capped: false,
+            stretches: Stretches::new(),
         }
     }
 
@@ -43,6 +53,10 @@ impl Hits {
     #[simd]
     pub fn gather<S: Simd>(&mut self, simd: S, rays: &RayTile, systems: &[Spheres<'_>]) -> usize {
         let mut count = 0;
+        if std::mem::take(&mut self.capped) {
+            self.cap.fill(0);
+        }
+        let cut = systems.iter().any(|system| system.clip.is_some());
         // Most pictures show one grid, in which a slot is a place.
         let only = match systems {
             [system] if system.classes.grids.len() == 1 => Some(&system.classes.grids[0]),
@@ -62,6 +76,9 @@ impl Hits {
                 None => self.of_any(simd, (rays, first), systems, mask),
             };
             self.surfaces(simd, rays, (first, centers));
+            if cut {
+                self.cut(simd, rays, (first, centers), systems);
+            }
         }
         count
     }
@@ -161,6 +178,62 @@ impl Hits {
         sized.select(nx * scale, -dx).store_slice(&mut self.normal[0][lanes.clone()]);
         sized.select(ny * scale, -dy).store_slice(&mut self.normal[1][lanes.clone()]);
         sized.select(nz * scale, -dz).store_slice(&mut self.normal[2][lanes]);
+    }
+
+    /// What cuts make of a block's hits: caps, and walls seen from within.
+    #[inline(always)]
+    fn cut<S: Simd>(
+        &mut self,
+        simd: S,
+        rays: &RayTile,
+        (first, [cx, cy, cz]): (usize, [f32x16<S>; 3]),
+        systems: &[Spheres<'_>],
+    ) {
+        let lanes = first..first + LANES;
+        let distance = f32x16::from_slice(simd, &rays.distance[lanes.clone()]);
+        let [[ox, oy, oz], [dx, dy, dz]] = rays.sixteen(simd, first);
+        let (x, y, z) = (cx - ox, cy - oy, cz - oz);
+        let middle = z.mul_add_precise(dz, y.mul_add_precise(dy, x * dx));
+        let to_center2 = z.mul_add_precise(z, y.mul_add_precise(y, x * x));
+        let radius = f32x16::from_slice(simd, &self.radius[lanes.clone()]);
+        let outside = to_center2.simd_ge(radius * radius);
+        let hit = self.mask[first / LANES];
+        for (system, spheres) in systems.iter().enumerate() {
+            let Some(clip) = spheres.clip else { continue };
+            let of = &rays.hit_system[lanes.clone()];
+            let own = (0..LANES).filter(|lane| usize::from(of[*lane]) == system);
+            let own = own.fold(0u64, |own, lane| own | 1 << lane) & u64::from(hit);
+            if own == 0 {
+                continue;
+            }
+            let own = mask32x16::from_bitmask(simd, own);
+            let lines = [[ox, oy, oz], [dx, dy, dz]];
+            self.stretches.begin(clip, 1);
+            self.stretches.find(simd, clip, 0, lines);
+            let on = own & self.stretches.on_cap(simd, 0, distance);
+            // Met where the ray leaves the sphere, from outside it.
+            let wall = own & outside & distance.simd_gt(middle);
+            let (normal, owners) = cap_normals(simd, clip, lines, (distance, on));
+            for axis in 0..3 {
+                let row = &mut self.normal[axis][lanes.clone()];
+                let sphere = f32x16::from_slice(simd, row);
+                let sphere = wall.select(-sphere, sphere);
+                on.select(normal[axis], sphere).store_slice(row);
+            }
+            if on.any_true() {
+                self.capped = true;
+                for (cap, owner) in self.cap[lanes.clone()].iter_mut().zip(owners) {
+                    *cap = (*cap).max(owner);
+                }
+            }
+        }
+    }
+
+    /// The cap that ray `ray` has hit, if it has hit one.
+    #[inline(always)]
+    pub fn cap_of(&self, ray: usize) -> Option<Cap> {
+        let owner = self.cap[ray].checked_sub(1)?;
+        Some(Cap { owner: owner as u16, point: self.position_of(ray) })
     }
 
     /// Where ray `ray` has hit something.

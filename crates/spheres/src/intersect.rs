@@ -34,6 +34,21 @@ pub(crate) fn meet<S: Simd>(
     direction: [f32x16<S>; 3],
     r2: f32x16<S>,
 ) -> (f32x16<S>, mask32x16<S>) {
+    let zero = f32x16::splat(simd, 0.0);
+    let (b, half, meets) = chord(simd, oc, direction, r2);
+    let entry = b - half;
+    let distance = entry.simd_gt(zero).select(entry, b + half);
+    (distance, meets & distance.simd_gt(zero))
+}
+
+/// b, √(r² − p²), and which rays meet their spheres, as for [`meet`], before or behind where they start.
+#[inline(always)]
+pub(crate) fn chord<S: Simd>(
+    simd: S,
+    oc: [f32x16<S>; 3],
+    direction: [f32x16<S>; 3],
+    r2: f32x16<S>,
+) -> (f32x16<S>, f32x16<S>, mask32x16<S>) {
     let ([ox, oy, oz], [dx, dy, dz]) = (oc, direction);
     let zero = f32x16::splat(simd, 0.0);
     let b = oz.mul_add_precise(dz, oy.mul_add_precise(dy, ox * dx));
@@ -42,17 +57,27 @@ pub(crate) fn meet<S: Simd>(
     let py = minus_b.mul_add_precise(dy, oy);
     let pz = minus_b.mul_add_precise(dz, oz);
     let inside = r2 - pz.mul_add_precise(pz, py.mul_add_precise(py, px * px));
-    let meets = inside.simd_ge(zero);
-    let half = inside.max(zero).sqrt();
-    let entry = b - half;
-    let distance = entry.simd_gt(zero).select(entry, b + half);
-    (distance, meets & distance.simd_gt(zero))
+    (b, inside.max(zero).sqrt(), inside.simd_ge(zero))
 }
 
 /// Tests all rays of the packet against one sphere and keeps nearer hits. Gives whether there were
 /// any. At equal distance the lower index in the file wins, and an earlier system before a later.
 #[simd]
 pub fn intersect<S: Simd>(
+    simd: S,
+    packet: &mut Packet,
+    sphere: Sphere,
+    index_of: &dyn Fn(u32) -> u32,
+) -> bool {
+    // What is not cut pays nothing for what is.
+    match packet.clipped {
+        false => intersect_rays::<S, false>(simd, packet, sphere, index_of),
+        true => intersect_rays::<S, true>(simd, packet, sphere, index_of),
+    }
+}
+
+#[inline(always)]
+fn intersect_rays<S: Simd, const CLIPPED: bool>(
     simd: S,
     packet: &mut Packet,
     sphere: Sphere,
@@ -76,7 +101,11 @@ pub fn intersect<S: Simd>(
         let ox = cx - load(simd, &packet.origin[0], first);
         let oy = cy - load(simd, &packet.origin[1], first);
         let oz = cz - load(simd, &packet.origin[2], first);
-        let (distance, mut hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+        let (oc, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        let (distance, mut hit) = match CLIPPED {
+            false => meet(simd, oc, direction, r2),
+            true => packet.stretches.meet(simd, first / LANES, (oc, direction), r2),
+        };
         if packet.peels {
             let after = load(simd, &packet.after, first);
             let at_it = (hit & distance.simd_eq(after)).to_bitmask();
@@ -162,7 +191,11 @@ pub(crate) fn dim<S: Simd>(
         let ox = cx - load(simd, &packet.origin[0], first);
         let oy = cy - load(simd, &packet.origin[1], first);
         let oz = cz - load(simd, &packet.origin[2], first);
-        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], r2);
+        let (oc, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        let (distance, hit) = match packet.clipped {
+            false => meet(simd, oc, direction, r2),
+            true => packet.stretches.meet(simd, first / LANES, (oc, direction), r2),
+        };
         let mut met = (hit & distance.simd_lt(reach)).to_bitmask();
         while met != 0 {
             let ray = first + met.trailing_zeros() as usize;

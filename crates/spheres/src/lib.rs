@@ -15,6 +15,7 @@
 mod aims;
 mod beam;
 mod bounce;
+mod clip;
 mod frames;
 mod frustum;
 mod hits;
@@ -44,6 +45,6 @@ pub use intersect::{Sphere, farthest, intersect};
 pub use packet::{LANES, MOST_RAYS, Packet, Surface};
 pub use picture::{Picture, render};
 pub use refine::Adaptive;
-pub use render::{Center, Finer, Primary, Renderer, Settings, Sink, Tile, View};
+pub use render::{Cap, Center, Finer, Primary, Renderer, Settings, Sink, Tile, View};
 pub use shade::Paint;
-pub use traverse::{Counts, Spheres, trace};
+pub use traverse::{Counts, Met, Spheres, trace};

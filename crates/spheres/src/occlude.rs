@@ -308,7 +308,7 @@ impl Occluder {
             }
         }
         let bounds = self.points.bounds(0, self.points.count);
-        self.bundle.block(simd, (cone, bounds, f32::INFINITY), work.view.systems, counts);
+        self.bundle.block(simd, (cone, bounds, f32::INFINITY), work.view.casting(), counts);
         let vectors = rays / LANES;
         for point in 0..self.points.count {
             for vector in point * vectors..(point + 1) * vectors {
@@ -362,7 +362,7 @@ impl Occluder {
         };
         let reach = staged.fill(simd, &mut self.bundle);
         let bounds = self.points.bounds(from, to);
-        self.bundle.block(simd, (&cone, bounds, reach), work.view.systems, counts);
+        self.bundle.block(simd, (&cone, bounds, reach), work.view.casting(), counts);
         for (ray, (cosine, point)) in staged.own.iter().enumerate() {
             self.points.all[*point as usize] += cosine;
             if self.bundle.is_open(ray) {
@@ -386,7 +386,7 @@ impl Occluder {
             let origin = one.origin[0];
             if let Some(cone) = Cone::around(&one.direction) {
                 let bounds = (origin, origin);
-                self.bundle.block(simd, (&cone, bounds, reach), work.view.systems, counts);
+                self.bundle.block(simd, (&cone, bounds, reach), work.view.casting(), counts);
             }
             let (cosine, point) = one.own[0];
             self.points.all[point as usize] += cosine;
@@ -430,7 +430,7 @@ impl Occluder {
         let classes = 4 * pattern.samples;
         let class_of =
             |ray: u32| work.quarter(ray as usize) * pattern.samples + pattern.sample(ray as usize);
-        let systems = work.view.systems;
+        let systems = work.view.casting();
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (_, ray) in &self.order[from..to] {
             let position = work.hits.position_of(*ray as usize);
@@ -677,7 +677,8 @@ pub(crate) fn share(work: Work<'_>, sums: &Sums, reaching: &mut [f32], times: bo
             let mut left = hits.mask[block] & square;
             while left != 0 {
                 let sphere = |lane: usize| {
-                    (hits.index[block * LANES + lane], rays.hit_system[block * LANES + lane])
+                    let ray = block * LANES + lane;
+                    (hits.index[ray], rays.hit_system[ray], hits.cap[ray])
                 };
                 let first = sphere(left.trailing_zeros() as usize);
                 let (mut same, mut visible, mut all) = (0u16, 0.0, 0.0);

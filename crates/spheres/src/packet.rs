@@ -1,6 +1,10 @@
 //! A packet of rays and what each has hit so far.
 
+use fearless_simd::{f32x16, prelude::*};
 use glam::Vec3;
+use motes_grid::Clip;
+
+use crate::clip::Stretches;
 
 /// Rays tested side by side by one SIMD instruction.
 pub const LANES: usize = 16;
@@ -43,6 +47,9 @@ pub struct Packet {
     pub(crate) system: u16,
     /// Optical depth of what each ray has met, for rays that go through.
     pub(crate) optical: [u32; MOST_RAYS],
+    /// Whether the spheres at hand are cut, and what of the rays is left then.
+    pub(crate) clipped: bool,
+    pub(crate) stretches: Stretches,
 }
 
 /// A surface that a ray has met. Along a ray, surfaces come by distance, then system, then index.
@@ -74,6 +81,8 @@ impl Packet {
             after_sphere: [(0, 0); MOST_RAYS],
             system: 0,
             optical: [0; MOST_RAYS],
+            clipped: false,
+            stretches: Stretches::new(),
         }
     }
 
@@ -181,11 +190,45 @@ impl Packet {
         self.pad();
     }
 
+    /// Goes on with more of the grids of a system that `first` was the first part of: what rays have hit of
+    /// it stays.
+    pub(crate) fn continue_system(&mut self, first: u16) {
+        for i in 0..self.rays {
+            let held = self.hit_slot[i] != NO_SLOT && self.hit_system[i] >= first;
+            self.slot[i] = if held { self.hit_slot[i] } else { NO_SLOT };
+        }
+        self.pad();
+    }
+
     /// Ends a system: where its spheres are nearest, they are the hits.
     pub fn end_system(&mut self, system: u16) {
         for i in (0..self.rays).filter(|i| self.slot[*i] != NO_SLOT) {
             self.hit_slot[i] = self.slot[i];
             self.hit_system[i] = system;
+        }
+    }
+
+    /// Ends a part of a system that goes on with others: no two parts share spheres, so that what is held
+    /// has been hit before.
+    pub(crate) fn end_part(&mut self, (first, part): (u16, u16)) {
+        for i in (0..self.rays).filter(|i| self.slot[*i] != NO_SLOT) {
+            let held = self.hit_slot[i] == self.slot[i] && self.hit_system[i] >= first;
+            if !held {
+                self.hit_slot[i] = self.slot[i];
+                self.hit_system[i] = part;
+            }
+        }
+    }
+
+    /// Lets the rays meet what a clip leaves, or, without one, everything.
+    #[inline(always)]
+    pub(crate) fn clip_to<S: Simd>(&mut self, simd: S, clip: Option<&Clip>) {
+        self.clipped = clip.is_some();
+        let Some(clip) = clip else { return };
+        self.stretches.begin(clip, self.lanes() / LANES);
+        for first in (0..self.lanes()).step_by(LANES) {
+            let rays = [sixteen(simd, &self.origin, first), sixteen(simd, &self.direction, first)];
+            self.stretches.find(simd, clip, first / LANES, rays);
         }
     }
 
@@ -213,6 +256,16 @@ impl Packet {
         one.optical[0] = self.optical[i];
         one
     }
+}
+
+#[inline(always)]
+fn sixteen<S: Simd>(simd: S, rows: &[[f32; MOST_RAYS]; 3], first: usize) -> [f32x16<S>; 3] {
+    let [x, y, z] = rows;
+    [
+        f32x16::from_slice(simd, &x[first..first + LANES]),
+        f32x16::from_slice(simd, &y[first..first + LANES]),
+        f32x16::from_slice(simd, &z[first..first + LANES]),
+    ]
 }
 
 impl Default for Packet {

@@ -11,6 +11,7 @@ use fearless_simd::{f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use motes_grid::{Grid, Seen};
 
+use crate::clip::Stretches;
 use crate::frames::{Area, BATCH, Drawn, FRAMES, Frames, Window};
 use crate::intersect::{bits, meet};
 use crate::overview::{Extent, GROUP, GroupView, Lens};
@@ -38,6 +39,10 @@ pub(crate) fn project<S: Simd>(
     (rays, counts): (&motes_scene::Rays, &mut Counts),
 ) {
     let (pattern, perspective) = (tile.pattern, tile.eye.is_some());
+    let clipped = spheres.clip.is_some();
+    if let Some(clip) = spheres.clip {
+        tile.clip_to(simd, clip);
+    }
     let lenses: Vec<Lens> = spheres.classes.grids.iter().map(|g| Lens::new(rays, g)).collect();
     let Some(sheet) = Sheet::of(simd, tile) else { return };
     let mut easel = Easel {
@@ -48,6 +53,7 @@ pub(crate) fn project<S: Simd>(
             corner: (place.corner.0 as f32, place.corner.1 as f32),
         },
         perspective,
+        clipped,
         spheres,
         farthest: [f32::INFINITY; PARTS * PARTS],
         farthest_of_all: f32::INFINITY,
@@ -80,6 +86,8 @@ struct Sheet<'a> {
     slot: &'a mut Blocks<u32>,
     /// Greatest distance of the rays of each block; −∞ beyond the blocks of a tile.
     limit: [f32; LIMITS],
+    /// What of the rays is left, where the spheres are cut.
+    stretches: &'a Stretches,
 }
 
 /// A number of each ray of a tile.
@@ -101,6 +109,7 @@ impl<'a> Sheet<'a> {
             distance,
             slot: tile.slot.as_chunks_mut().0.first_chunk_mut()?,
             limit,
+            stretches: &tile.stretches,
         })
     }
 
@@ -108,7 +117,7 @@ impl<'a> Sheet<'a> {
     /// index in the file wins, and an earlier system before a later. Gives the part whose greatest distance
     /// may have become less.
     #[inline(always)]
-    fn test<S: Simd, const PERSPECTIVE: bool>(
+    fn test<S: Simd, const PERSPECTIVE: bool, const CLIPPED: bool>(
         &mut self,
         simd: S,
         spheres: &Spheres<'_>,
@@ -127,7 +136,11 @@ impl<'a> Sheet<'a> {
         let dx = f32x16::from_slice(simd, &dx[block]);
         let dy = f32x16::from_slice(simd, &dy[block]);
         let dz = f32x16::from_slice(simd, &dz[block]);
-        let (distance, hit) = meet(simd, [ox, oy, oz], [dx, dy, dz], sphere.r2);
+        let (oc, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        let (distance, hit) = match CLIPPED {
+            false => meet(simd, oc, direction, sphere.r2),
+            true => self.stretches.meet(simd, block, (oc, direction), sphere.r2),
+        };
         let distance = hit.select(distance, f32x16::splat(simd, f32::INFINITY));
         let before = f32x16::from_slice(simd, &self.distance[block]);
         let nearer = distance.simd_lt(before);
@@ -159,6 +172,7 @@ struct Easel<'a> {
     sheet: Sheet<'a>,
     window: Window,
     perspective: bool,
+    clipped: bool,
     spheres: &'a Spheres<'a>,
     /// Greatest distance of the rays of each part; never less than the truth.
     farthest: [f32; PARTS * PARTS],
@@ -287,16 +301,17 @@ impl Easel<'_> {
         }
         let reach = reach.reduce_max();
         let run = Run { grid, seen, block_first: start, first_slot: group.first_slot };
-        if self.perspective {
-            self.run::<S, true>(simd, run, (start, end), reach);
-        } else {
-            self.run::<S, false>(simd, run, (start, end), reach);
+        match (self.perspective, self.clipped) {
+            (true, false) => self.run::<S, true, false>(simd, run, (start, end), reach),
+            (true, true) => self.run::<S, true, true>(simd, run, (start, end), reach),
+            (false, false) => self.run::<S, false, false>(simd, run, (start, end), reach),
+            (false, true) => self.run::<S, false, true>(simd, run, (start, end), reach),
         }
     }
 
     /// Draws the particles `from..to` that lie nearer than `reach`.
     #[inline(always)]
-    fn run<S: Simd, const PERSPECTIVE: bool>(
+    fn run<S: Simd, const PERSPECTIVE: bool, const CLIPPED: bool>(
         &mut self,
         simd: S,
         run: Run<'_>,
@@ -322,19 +337,23 @@ impl Easel<'_> {
                 may |= (seen & window.frame::<S, PERSPECTIVE>(simd, all, reach, (frames, row)))
                     << (row * LANES);
             }
-            self.batch::<S, PERSPECTIVE>(simd, may);
+            self.batch::<S, PERSPECTIVE, CLIPPED>(simd, may);
         }
     }
 
     /// Draws those of a batch of framed spheres that may show.
     #[inline(always)]
-    fn batch<S: Simd, const PERSPECTIVE: bool>(&mut self, simd: S, mut may: u64) {
+    fn batch<S: Simd, const PERSPECTIVE: bool, const CLIPPED: bool>(
+        &mut self,
+        simd: S,
+        mut may: u64,
+    ) {
         let mut due = 0;
         while may != 0 {
             let lane = may.trailing_zeros() as usize;
             may &= may - 1;
             match self.frames.large(lane) {
-                Some(area) => self.draw::<S, PERSPECTIVE>(simd, lane, area),
+                Some(area) => self.draw::<S, PERSPECTIVE, CLIPPED>(simd, lane, area),
                 None => due = self.enlist(lane, due),
             }
         }
@@ -343,7 +362,8 @@ impl Easel<'_> {
         for due in &self.due[..due.min(MOST_DUE)] {
             let (lane, block) = (usize::from(due >> 8) % FRAMES, usize::from(due & 255));
             let sphere = (&self.frames.sphere(simd, lane), self.frames.slot(lane));
-            stale |= self.sheet.test::<S, PERSPECTIVE>(simd, self.spheres, sphere, block);
+            let sheet = &mut self.sheet;
+            stale |= sheet.test::<S, PERSPECTIVE, CLIPPED>(simd, self.spheres, sphere, block);
         }
         self.stale |= stale;
     }
@@ -364,7 +384,12 @@ impl Easel<'_> {
 
     /// Draws a large sphere.
     #[inline(always)]
-    fn draw<S: Simd, const PERSPECTIVE: bool>(&mut self, simd: S, lane: usize, area: Area) {
+    fn draw<S: Simd, const PERSPECTIVE: bool, const CLIPPED: bool>(
+        &mut self,
+        simd: S,
+        lane: usize,
+        area: Area,
+    ) {
         let near = self.frames.near[lane];
         if !self.shows(simd, area, near) {
             return;
@@ -376,8 +401,9 @@ impl Easel<'_> {
                 let block = y * SIDE_BLOCKS + x;
                 if near < self.sheet.limit[block] {
                     self.counts.tests += LANES as u64;
+                    let sheet = &mut self.sheet;
                     self.stale |=
-                        self.sheet.test::<S, PERSPECTIVE>(simd, self.spheres, sphere, block);
+                        sheet.test::<S, PERSPECTIVE, CLIPPED>(simd, self.spheres, sphere, block);
                 }
             }
         }

@@ -49,6 +49,63 @@ pub fn trace(origin: DVec3, direction: DVec3, spheres: &[Sphere]) -> Option<Hit>
     nearest
 }
 
+/// A plane that cuts: normal·x ≥ offset is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Unit vector towards what is kept.
+    pub normal: DVec3,
+    /// normal·p for any point p of the plane.
+    pub offset: f64,
+    /// Whether what it slices is closed with a cap.
+    pub caps: bool,
+}
+
+/// Whether a point is kept: every clause has a face that keeps it.
+pub fn keeps(clauses: &[Vec<Face>], point: DVec3) -> bool {
+    let face = |face: &Face| face.normal.dot(point) >= face.offset;
+    clauses.iter().all(|clause| clause.iter().any(face))
+}
+
+/// The surfaces along a ray of what cuts leave of a sphere, nearest first: distances, and the normals of caps.
+///
+/// These are the points of the sphere that are kept, and the points inside the sphere where a face with caps
+/// is what parts kept from not kept.
+pub fn surfaces(
+    (origin, direction): (DVec3, DVec3),
+    sphere: Sphere,
+    clauses: &[Vec<Face>],
+) -> Vec<(f64, Option<DVec3>)> {
+    let direction = direction.normalize();
+    let oc = sphere.center - origin;
+    let b = oc.dot(direction);
+    let inside = sphere.radius * sphere.radius - (oc - direction * b).length_squared();
+    if inside < 0.0 {
+        return Vec::new();
+    }
+    let (entry, exit) = (b - inside.sqrt(), b + inside.sqrt());
+    let at = |t: f64| origin + direction * t;
+    let mut all: Vec<(f64, Option<DVec3>)> = Vec::new();
+    all.extend([entry, exit].iter().filter(|t| keeps(clauses, at(**t))).map(|t| (*t, None)));
+    for (i, clause) in clauses.iter().enumerate() {
+        for (j, face) in clause.iter().enumerate().filter(|(_, face)| face.caps) {
+            let t = (face.offset - face.normal.dot(origin)) / face.normal.dot(direction);
+            let others = |own: &[Vec<Face>], but: usize| {
+                own.iter().enumerate().filter(|(at, _)| *at != but).all(|(_, c)| {
+                    c.iter().any(|face| face.normal.dot(at(t)) >= face.offset)
+                })
+            };
+            let beside = clause.iter().enumerate().filter(|(at, _)| *at != j);
+            let mut beside = beside.map(|(_, face)| face.normal.dot(at(t)) >= face.offset);
+            if t > entry && t < exit && others(clauses, i) && !beside.any(|keeps| keeps) {
+                all.push((t, Some(face.normal)));
+            }
+        }
+    }
+    all.retain(|(t, _)| *t > 0.0);
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all
+}
+
 /// How far f32 arithmetic may put a hit from the truth.
 ///
 /// The perpendicular p from ray to centre, of length below r, comes from coordinates of size D =

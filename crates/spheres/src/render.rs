@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
 use fearless_simd_macros::simd;
+use glam::Vec3;
 use motes_scene::{Lens, Lights, Rays};
 
 use crate::aims::Aims;
@@ -14,13 +15,13 @@ use crate::lens::bend;
 use crate::near::Shelves;
 use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
-use crate::packet::{MOST_RAYS, NO_SLOT, Packet};
+use crate::packet::{MOST_RAYS, NO_SLOT, Packet, Surface};
 use crate::peel::Peel;
 use crate::project::project;
 use crate::refine::{Adaptive, Refine};
 use crate::shade::{Canvas, Paint, shade};
 use crate::tile::{Pattern, Place, RayTile};
-use crate::traverse::{Counts, Spheres, trace};
+use crate::traverse::{Counts, Spheres, first_part, trace};
 
 /// How the first hits are found. Changes the speed, never the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,6 +72,24 @@ pub struct View<'a> {
     pub paint: &'a dyn Paint,
     /// The lights.
     pub lights: &'a Lights,
+    /// What keeps light away, in place of the systems; empty: the systems.
+    pub casters: &'a [Spheres<'a>],
+}
+
+impl<'a> View<'a> {
+    /// What keeps light away.
+    pub(crate) fn casting(&self) -> &'a [Spheres<'a>] {
+        if self.casters.is_empty() { self.systems } else { self.casters }
+    }
+}
+
+/// Where a cut has laid the inside of a particle open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cap {
+    /// The owner of the face.
+    pub owner: u16,
+    /// The point at hand, about the particles' origin.
+    pub point: Vec3,
 }
 
 /// What the ray through a pixel's centre hit.
@@ -271,7 +290,7 @@ impl<'a> Plan<'a> {
             view,
             settings,
             courses: samples.map(|n| Course::new(n, settings.samples, view.lights)).collect(),
-            shelves: Shelves::new(if occluded { view.systems } else { &[] }),
+            shelves: Shelves::new(if occluded { view.casting() } else { &[] }),
             groups: Vec::new(),
             shown: Vec::new(),
         };
@@ -420,11 +439,22 @@ impl<'a> Plan<'a> {
                 trace_tile(simd, (rays, &mut desk.packet), how, counts);
             }
             Primary::Project => {
+                let mut whole = 0;
                 for (system, spheres) in view.systems.iter().enumerate() {
                     let shown = (&self.groups[system][..], &self.shown[system][area][..]);
-                    if !shown.1.is_empty() {
+                    whole = if spheres.continues { whole } else { system as u16 };
+                    if shown.1.is_empty() {
+                        continue;
+                    }
+                    if spheres.continues {
+                        rays.continue_system(whole);
+                    } else {
                         rays.begin_system();
-                        project(simd, (rays, part), spheres, shown, (view.rays, counts));
+                    }
+                    project(simd, (rays, part), spheres, shown, (view.rays, counts));
+                    if spheres.continues {
+                        rays.end_part((whole, system as u16));
+                    } else {
                         rays.end_system(system as u16);
                     }
                 }
@@ -530,7 +560,9 @@ fn trace_tile<S: Simd>(
                         match met {
                             None => packet.push(origin, direction),
                             Some(hits) => {
-                                packet.push_after(origin, direction, hits.surface(rays, ray))
+                                let met = hits.surface(rays, ray);
+                                let system = first_part(systems, met.system);
+                                packet.push_after(origin, direction, Surface { system, ..met });
                             }
                         }
                     }

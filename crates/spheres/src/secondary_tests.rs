@@ -2,7 +2,9 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::{DVec3, Vec3};
-use motes_grid::{Params, Radii, RadiusClasses, Visibility};
+use motes_grid::{
+    Clause, Clip, Cut, Face, Params, Plane, Radii, RadiusClasses, Sections, Visibility, Width,
+};
 
 use crate::beam::Beam;
 use crate::near::{Near, Shelves};
@@ -59,10 +61,63 @@ fn blocked(ray: Ray, spheres: &[reference::Sphere]) -> Option<bool> {
     (!doubt).then_some(false)
 }
 
+/// Faces of a clip, moved outward by `shift`.
+fn faces(clip: &Clip, shift: f64) -> Vec<Vec<reference::Face>> {
+    let face = |f: &Face| reference::Face {
+        normal: f.plane.normal.as_dvec3(),
+        offset: f64::from(f.plane.offset) - shift,
+        caps: f.cut == Cut::Caps,
+    };
+    clip.clauses.iter().map(|c| c.faces.iter().map(face).collect()).collect()
+}
+
+/// As [`blocked`], by what a clip leaves.
+fn blocked_by_rest(ray: Ray, spheres: &[reference::Sphere], clip: &Clip) -> Option<bool> {
+    let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
+    let solid = clip.faces().all(|face| face.cut == Cut::Caps);
+    let judge = |sphere: &reference::Sphere, clauses: &[Vec<reference::Face>], more: f64| {
+        let starts_in = o.distance(sphere.center) < sphere.radius && reference::keeps(clauses, o);
+        let within = |(t, _): &(f64, _)| *t < f64::from(ray.reach) + more;
+        (solid && starts_in)
+            || reference::surfaces((o, d), *sphere, clauses).iter().any(within)
+    };
+    let slack = 1e-5;
+    let variants: Vec<_> = [-slack, 0.0, slack].iter().map(|s| faces(clip, *s)).collect();
+    let mut doubt = false;
+    for sphere in spheres {
+        let mut all = Vec::new();
+        for clauses in &variants {
+            for grown in [-slack, 0.0, slack] {
+                let sphere = reference::Sphere { radius: sphere.radius + grown, ..*sphere };
+                all.push(judge(&sphere, clauses, grown));
+            }
+        }
+        if all.iter().all(|blocked| *blocked) {
+            return Some(true);
+        }
+        doubt |= all.iter().any(|blocked| *blocked);
+    }
+    (!doubt).then_some(false)
+}
+
+fn random_clip(random: &mut Random, round: usize) -> Clip {
+    let clause = |random: &mut Random| {
+        let face = |random: &mut Random| Face {
+            plane: Plane::new(random.point().as_dvec3(), random.direction().as_dvec3()).unwrap(),
+            cut: if round % 2 == 0 || random.unit() < 0.5 { Cut::Caps } else { Cut::Open },
+            owner: 0,
+        };
+        let faces = 1 + usize::from(random.unit() < 0.4) + usize::from(random.unit() < 0.2);
+        Clause { faces: (0..faces).map(|_| face(random)).collect() }
+    };
+    Clip { clauses: (0..1 + round % 3).map(|_| clause(random)).collect() }
+}
+
 struct Scene {
     spheres: Vec<reference::Sphere>,
     classes: RadiusClasses,
     visible: Vec<Visibility>,
+    clip: Clip,
 }
 
 impl Scene {
@@ -77,14 +132,30 @@ impl Scene {
         let spheres = spheres.collect();
         let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
         let visible = classes.grids.iter().map(Visibility::all).collect();
-        Self { spheres, classes, visible }
+        Self { spheres, classes, visible, clip: Clip::default() }
+    }
+
+    fn cut(mut self, clip: Clip) -> Self {
+        let mut sections = Sections::new(&self.classes.grids, self.visible, Width::Four);
+        sections.set(&self.classes.grids, clip.clone());
+        self.visible = sections.visible().to_vec();
+        Self { clip, ..self }
+    }
+
+    fn systems(&self) -> [Spheres<'_>; 1] {
+        let clip = (!self.clip.is_empty()).then_some(&self.clip);
+        [Spheres { clip, ..Spheres::new(&self.classes, &self.visible) }]
     }
 
     /// Compares, and gives how many rays were blocked and how many open.
     fn judge(&self, name: &str, rays: &[Ray], open: &[bool]) -> [usize; 2] {
         let mut counts = [0; 2];
         for (ray, open) in rays.iter().zip(open) {
-            if let Some(blocked) = blocked(*ray, &self.spheres) {
+            let blocked = match self.clip.is_empty() {
+                true => blocked(*ray, &self.spheres),
+                false => blocked_by_rest(*ray, &self.spheres, &self.clip),
+            };
+            if let Some(blocked) = blocked {
                 assert_eq!(blocked, !open, "{name}: from {} to {}", ray.origin, ray.direction);
                 counts[usize::from(*open)] += 1;
             }
@@ -113,14 +184,23 @@ fn shaft<S: Simd>(simd: S, rays: &[Ray], systems: &[Spheres<'_>]) -> Vec<bool> {
     (0..rays.len()).map(|ray| bundle.is_open(ray)).collect()
 }
 
+/// Spheres of one size or of many; in every other group of rounds, cut.
+fn scene(random: &mut Random, round: usize) -> Scene {
+    let radii = if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) };
+    let scene = Scene::new(random, 400, radii);
+    match round / 3 % 2 {
+        0 => scene,
+        _ => scene.cut(random_clip(random, round)),
+    }
+}
+
 #[test]
 fn shafts_find_what_brute_force_finds() {
     let mut random = Random(7);
     let mut seen = [0; 2];
-    for round in 0..60 {
-        let scene =
-            Scene::new(&mut random, 400, if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) });
-        let systems = [Spheres::new(&scene.classes, &scene.visible)];
+    for round in 0..150 {
+        let scene = scene(&mut random, round);
+        let systems = scene.systems();
         let axis = if round < 6 {
             [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z][round]
         } else {
@@ -148,9 +228,8 @@ fn beams_find_what_brute_force_finds() {
     let mut random = Random(11);
     let mut seen = [0; 2];
     for round in 0..80 {
-        let scene =
-            Scene::new(&mut random, 400, if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) });
-        let systems = [Spheres::new(&scene.classes, &scene.visible)];
+        let scene = scene(&mut random, round);
+        let systems = scene.systems();
         let direction = if round < 6 {
             [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z][round]
         } else {

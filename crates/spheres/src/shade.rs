@@ -11,7 +11,7 @@ use crate::hits::Hits;
 use crate::lanes::Lanes;
 use crate::packet::LANES;
 use crate::refine::Refine;
-use crate::render::View;
+use crate::render::{Cap, View};
 use crate::tile::{Pattern, RayTile, SIDE_BLOCKS, TILE_RAYS};
 
 /// The colour of each particle.
@@ -24,6 +24,11 @@ pub trait Paint: Sync {
         None
     }
 
+    /// Linear RGB of the inside of a particle, where a cut has laid it open; `None`: as its outside.
+    fn cap(&self, _system: u16, _index: u32, _cap: Cap) -> Option<Vec3> {
+        None
+    }
+
     /// How much of what lies behind it a particle hides: 0 nothing, 1 all.
     fn opacity(&self, _system: u16, _index: u32) -> f32 {
         1.0
@@ -33,6 +38,13 @@ pub trait Paint: Sync {
     fn translucent(&self) -> bool {
         false
     }
+}
+
+/// The colour of a particle, or of its inside.
+#[inline(always)]
+pub(crate) fn color_of(paint: &dyn Paint, system: u16, (index, cap): (u32, Option<Cap>)) -> Vec3 {
+    let inside = cap.and_then(|cap| paint.cap(system, index, cap));
+    inside.unwrap_or_else(|| paint.color(system, index))
 }
 
 /// Where the light of a tile's hits goes.
@@ -63,7 +75,7 @@ pub(crate) fn shade<S: Simd>(
 ) {
     let lights = view.lights;
     let one_system = view.systems.len() == 1;
-    let uniform = if one_system { view.paint.uniform(0) } else { None };
+    let uniform = if one_system && !hits.capped { view.paint.uniform(0) } else { None };
     let half = f32x16::splat(simd, 0.5);
     let sky = lights.sky - lights.ground;
     for block in (0..TILE_RAYS / LANES).filter(|block| hits.mask[*block] != 0) {
@@ -79,7 +91,8 @@ pub(crate) fn shade<S: Simd>(
                     let lane = left.trailing_zeros() as usize;
                     left &= left - 1;
                     let ray = block * LANES + lane;
-                    let color = view.paint.color(rays.hit_system[ray], hits.index[ray]);
+                    let of = (hits.index[ray], hits.cap_of(ray));
+                    let color = color_of(view.paint, rays.hit_system[ray], of);
                     albedo[0][lane] = color.x;
                     albedo[1][lane] = color.y;
                     albedo[2][lane] = color.z;

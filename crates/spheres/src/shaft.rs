@@ -15,8 +15,9 @@
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 use fearless_simd_macros::simd;
 use glam::Vec3;
-use motes_grid::{Grid, Seen, Visibility};
+use motes_grid::{Clip, Grid, Seen, Visibility};
 
+use crate::clip::Stretches;
 use crate::frustum::Frustum;
 use crate::intersect::{Cull, Sphere, bits, cull};
 use crate::lanes::Lanes;
@@ -39,6 +40,8 @@ pub(crate) struct Bundle {
     /// Middle and spread of the origins of each vector; the spread is −∞ once all of it is blocked.
     middle: [Lanes<f32>; 3],
     spread: Lanes<f32>,
+    /// What of the rays is left, where the spheres at hand are cut.
+    stretches: Stretches,
 }
 
 /// The directions of a bundle: what bounds them.
@@ -155,6 +158,7 @@ impl Bundle {
             reach: Lanes::new(LOST, 0),
             middle: none(),
             spread: Lanes::new(LOST, 0),
+            stretches: Stretches::new(),
         }
     }
 
@@ -186,6 +190,22 @@ impl Bundle {
         reach.store_slice(&mut self.reach[lanes]);
         self.spread[self.vectors] = around.1;
         self.vectors += 1;
+    }
+
+    /// Finds what a clip, if there is one, leaves of the rays.
+    #[inline(always)]
+    fn clip_to<S: Simd>(&mut self, simd: S, clip: Option<&Clip>) {
+        let Some(clip) = clip else { return };
+        self.stretches.begin(clip, self.vectors);
+        for vector in 0..self.vectors {
+            let at = vector * LANES;
+            let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
+            let rays = [
+                [load(simd, ox, at), load(simd, oy, at), load(simd, oz, at)],
+                [load(simd, dx, at), load(simd, dy, at), load(simd, dz, at)],
+            ];
+            self.stretches.find(simd, clip, vector, rays);
+        }
     }
 
     fn grow(&mut self) {
@@ -230,13 +250,15 @@ impl Bundle {
             return;
         }
         for spheres in systems {
+            self.clip_to(simd, spheres.clip);
             for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
                 let bounds = (grid.low, grid.high, grid.greatest_radius);
                 let Some(frustum) = cone.frustum(origins, reach, bounds) else { continue };
                 let planes = Cull::new(simd, &frustum);
                 let far = frustum.k_end * frustum.sign;
-                let mut walk =
-                    Walk { bundle: self, cone, frustum, planes, far, grid, visible, live, counts };
+                let clipped = spheres.clip.is_some();
+                let of = (grid, visible, clipped);
+                let mut walk = Walk { bundle: self, cone, frustum, planes, far, of, live, counts };
                 walk.blocks(simd);
                 live = walk.live;
                 if live == 0 {
@@ -255,8 +277,8 @@ struct Walk<'a, S: Simd> {
     planes: Cull<S>,
     /// How far along K the rays look, times the sign of K.
     far: f32,
-    grid: &'a Grid,
-    visible: &'a Visibility,
+    /// A grid, what is visible of it, and whether it is cut.
+    of: (&'a Grid, &'a Visibility, bool),
     /// How many vectors have a ray that is not blocked.
     live: usize,
     counts: &'a mut Counts,
@@ -266,7 +288,7 @@ impl<S: Simd> Walk<'_, S> {
     /// Walks the slices of blocks, until all rays are blocked.
     #[inline(always)]
     fn blocks(&mut self, simd: S) {
-        let grid = self.grid;
+        let grid = self.of.0;
         let lattice = &grid.lattice;
         let radius = grid.greatest_radius;
         let [k, u, v] = self.frustum.axes;
@@ -296,7 +318,7 @@ impl<S: Simd> Walk<'_, S> {
     /// Tests the spheres of a block.
     #[inline(always)]
     fn block(&mut self, simd: S, index: usize) {
-        let grid = self.grid;
+        let grid = self.of.0;
         let block = &grid.blocks[index];
         let [k, ..] = self.frustum.axes;
         let ahead = self.frustum.sign;
@@ -311,7 +333,7 @@ impl<S: Simd> Walk<'_, S> {
             return;
         }
         let particles = grid.particles_of(index);
-        match self.visible.block(grid, index) {
+        match self.of.1.block(grid, index) {
             Seen::Hidden => {}
             Seen::Shown => self.run(simd, (particles.start, particles.end), None),
             Seen::Mixed(words) => {
@@ -332,12 +354,12 @@ impl<S: Simd> Walk<'_, S> {
             }
             if may != 0 {
                 self.counts.spheres += u64::from(may.count_ones());
-                may &= cull(simd, &self.planes, &self.frustum, (self.grid, slot), self.far);
+                may &= cull(simd, &self.planes, &self.frustum, (self.of.0, slot), self.far);
             }
             while may != 0 {
                 let place = slot + may.trailing_zeros() as usize;
                 may &= may - 1;
-                let (center, radius) = (self.grid.center(place), self.grid.radius_at(place));
+                let (center, radius) = (self.of.0.center(place), self.of.0.radius_at(place));
                 self.test(simd, Sphere { center, radius, slot: 0 });
                 if self.live == 0 {
                     return;
@@ -400,7 +422,13 @@ impl<S: Simd> Walk<'_, S> {
         let dz = load(simd, &bundle.direction[2], lanes.start);
         let reach = load(simd, &bundle.reach, lanes.start);
         self.counts.tests += LANES as u64;
-        let blocks = blocks(simd, [x, y, z], [dx, dy, dz], (sphere.radius, reach));
+        let (oc, direction) = ([x, y, z], [dx, dy, dz]);
+        let blocks = match self.of.2 {
+            false => blocks(simd, oc, direction, (sphere.radius, reach)),
+            true => {
+                bundle.stretches.blocks(simd, vector, (oc, direction), (sphere.radius, reach))
+            }
+        };
         if blocks.any_true() {
             let blocked = f32x16::splat(simd, LOST);
             let reach = blocks.select(blocked, reach);

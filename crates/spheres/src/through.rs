@@ -38,7 +38,7 @@ impl Sent<'_> {
     #[inline(always)]
     fn send<S: Simd>(&mut self, simd: S, work: Work<'_>, counts: &mut Counts) {
         if !self.packet.is_empty() {
-            trace_through(simd, self.packet, work.view.systems, work.view.paint, counts);
+            trace_through(simd, self.packet, work.view.casting(), work.view.paint, counts);
         }
         for (i, (ray, cosine)) in self.own[..self.packet.len()].iter().enumerate() {
             self.sums.all[*ray as usize] += cosine;

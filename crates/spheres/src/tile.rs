@@ -7,8 +7,10 @@
 use fearless_simd::{f32x16, prelude::*};
 use fearless_simd_macros::simd;
 use glam::Vec3;
+use motes_grid::Clip;
 use motes_scene::{Projection, Rays};
 
+use crate::clip::Stretches;
 use crate::lanes::Lanes;
 use crate::packet::{BLOCKED, LANES, NO_SLOT};
 
@@ -110,6 +112,8 @@ pub(crate) struct RayTile {
     pub hit_slot: Lanes<u32>,
     /// The system of the nearest sphere.
     pub hit_system: Vec<u16>,
+    /// What of the rays is left where the spheres at hand are cut.
+    pub stretches: Stretches,
 }
 
 /// Which part of the picture a tile is: its first pixel, and how many of its pixels are in the picture.
@@ -131,6 +135,7 @@ impl RayTile {
             slot: Lanes::new(NO_SLOT, TILE_RAYS),
             hit_slot: Lanes::new(NO_SLOT, TILE_RAYS),
             hit_system: vec![0; TILE_RAYS],
+            stretches: Stretches::new(),
         }
     }
 
@@ -235,6 +240,57 @@ impl RayTile {
             self.hit_slot[ray] = self.slot[ray];
             self.hit_system[ray] = system;
         }
+    }
+
+    /// As [`crate::Packet::continue_system`].
+    pub fn continue_system(&mut self, first: u16) {
+        for ray in 0..TILE_RAYS {
+            let held = self.hit_slot[ray] != NO_SLOT && self.hit_system[ray] >= first;
+            self.slot[ray] = if held { self.hit_slot[ray] } else { NO_SLOT };
+        }
+    }
+
+    /// As [`crate::Packet::end_part`].
+    pub fn end_part(&mut self, (first, part): (u16, u16)) {
+        for ray in (0..TILE_RAYS).filter(|ray| self.slot[*ray] != NO_SLOT) {
+            let held = self.hit_slot[ray] == self.slot[ray] && self.hit_system[ray] >= first;
+            if !held {
+                self.hit_slot[ray] = self.slot[ray];
+                self.hit_system[ray] = part;
+            }
+        }
+    }
+
+    /// Finds what a clip leaves of the rays.
+    #[inline(always)]
+    pub fn clip_to<S: Simd>(&mut self, simd: S, clip: &Clip) {
+        self.stretches.begin(clip, TILE_RAYS / LANES);
+        for vector in 0..TILE_RAYS / LANES {
+            let rays = self.sixteen(simd, vector * LANES);
+            self.stretches.find(simd, clip, vector, rays);
+        }
+    }
+
+    /// Origins and directions of the sixteen rays from `first` on.
+    #[inline(always)]
+    pub fn sixteen<S: Simd>(&self, simd: S, first: usize) -> [[f32x16<S>; 3]; 2] {
+        let lanes = first..first + LANES;
+        let [dx, dy, dz] = &self.direction;
+        let direction = [
+            f32x16::from_slice(simd, &dx[lanes.clone()]),
+            f32x16::from_slice(simd, &dy[lanes.clone()]),
+            f32x16::from_slice(simd, &dz[lanes.clone()]),
+        ];
+        let [ox, oy, oz] = &self.origin;
+        let origin = match self.eye {
+            Some(eye) => [splat(simd, eye.x), splat(simd, eye.y), splat(simd, eye.z)],
+            None => [
+                f32x16::from_slice(simd, &ox[lanes.clone()]),
+                f32x16::from_slice(simd, &oy[lanes.clone()]),
+                f32x16::from_slice(simd, &oz[lanes]),
+            ],
+        };
+        [origin, direction]
     }
 }
 

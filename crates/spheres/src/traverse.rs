@@ -7,11 +7,14 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd_macros::simd;
+use glam::Vec3;
 use motes_grid::{Block, Clip, Grid, RadiusClasses, Seen, Visibility};
 
+use crate::clip::cap_at;
 use crate::frustum::{Bounds, Frustum};
 use crate::intersect::{Cull, Sphere, bits, cull, dim, farthest, intersect, optical_depth};
 use crate::packet::{LANES, Packet};
+use crate::render::Cap;
 use crate::shade::Paint;
 
 /// One particle system as the tracer sees it: its grids, and what is visible of each.
@@ -49,11 +52,53 @@ impl<'a> Spheres<'a> {
         unreachable!("slots come from these grids")
     }
 
+    /// The surface that a ray has met at `distance` on the sphere at `slot`.
+    pub fn surface(&self, slot: u32, (origin, direction): (Vec3, Vec3), distance: f32) -> Met {
+        let (grid, place) = self.locate(slot);
+        let point = origin + direction * distance;
+        let cap = self.clip.and_then(|clip| cap_at(clip, (origin, direction), distance));
+        let outward = match cap {
+            Some(face) => face.plane.normal,
+            None => (point - grid.center(place)).normalize_or(-direction),
+        };
+        Met {
+            point,
+            normal: if outward.dot(direction) < 0.0 { outward } else { -outward },
+            radius: grid.radius_at(place),
+            index: grid.index(place),
+            cap: cap.map(|face| Cap { owner: face.owner, point }),
+        }
+    }
+
     /// A sphere's index in the file's own order.
     pub fn index(&self, slot: u32) -> u32 {
         let (grid, place) = self.locate(slot);
         grid.index(place)
     }
+}
+
+/// A surface that a ray has met.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// Where.
+    pub point: Vec3,
+    /// Unit normal, towards where the ray came from.
+    pub normal: Vec3,
+    /// Radius of the sphere.
+    pub radius: f32,
+    /// Its index in the file's own order.
+    pub index: u32,
+    /// Whether a cut has laid the surface open.
+    pub cap: Option<Cap>,
+}
+
+/// The first part of the system that `part` belongs to.
+pub(crate) fn first_part(systems: &[Spheres<'_>], part: u16) -> u16 {
+    let mut first = part;
+    while systems.get(first as usize).is_some_and(|s| s.continues) && first > 0 {
+        first -= 1;
+    }
+    first
 }
 
 /// Counts of work, for the statistics and the paper's tables.
@@ -80,16 +125,23 @@ impl Counts {
 /// Traces the packet through the systems; afterwards each ray holds its nearest hit.
 #[simd]
 pub fn trace<S: Simd>(simd: S, packet: &mut Packet, systems: &[Spheres<'_>], counts: &mut Counts) {
+    let mut whole = 0;
     for (system, spheres) in systems.iter().enumerate() {
-        packet.begin_system();
-        packet.system = system as u16;
+        if spheres.continues {
+            packet.continue_system(whole);
+        } else {
+            whole = system as u16;
+            packet.begin_system();
+        }
+        packet.system = whole;
+        packet.clip_to(simd, spheres.clip);
         let mut first_slot = 0;
         for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
             let room = Room { spheres, grid, visible, first_slot, dims: None };
             trace_grid(simd, packet, room, counts);
             first_slot += grid.len() as u32;
         }
-        packet.end_system(system as u16);
+        packet.end_part((whole, system as u16));
     }
 }
 
@@ -105,6 +157,7 @@ pub(crate) fn trace_through<S: Simd>(
 ) {
     for (system, spheres) in systems.iter().enumerate() {
         packet.begin_system();
+        packet.clip_to(simd, spheres.clip);
         let dims = Some((paint, system as u16));
         let mut first_slot = 0;
         for (grid, visible) in spheres.classes.grids.iter().zip(spheres.visible) {
@@ -137,6 +190,7 @@ fn trace_grid<S: Simd>(simd: S, packet: &mut Packet, room: Room<'_>, counts: &mu
             for i in 0..packet.rays {
                 let mut one = packet.single(i);
                 one.pad();
+                one.clip_to(simd, room.spheres.clip);
                 trace_grid(simd, &mut one, room, counts);
                 packet.distance[i] = one.distance[0];
                 packet.slot[i] = one.slot[0];

@@ -69,7 +69,7 @@ fn picture(
     let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
     let systems = [Spheres::new(&classes, &visible)];
-    let view = View { rays, systems: &systems, paint: &Gray(gray), lights };
+    let view = View { rays, systems: &systems, paint: &Gray(gray), lights, casters: &[] };
     render(view, settings, &|_, _| true).unwrap()
 }
 

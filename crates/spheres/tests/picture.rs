@@ -63,7 +63,7 @@ fn picture(
     let classes = RadiusClasses::build(&positions, Radii::Each(&radii), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
     let systems = [Spheres::new(&classes, &visible)];
-    let view = View { rays, systems: &systems, paint: &White, lights };
+    let view = View { rays, systems: &systems, paint: &White, lights, casters: &[] };
     render(view, settings, &|_, _| true).unwrap()
 }
 
@@ -236,7 +236,7 @@ fn a_watch_can_cancel() {
     let classes = RadiusClasses::build(&positions, Radii::Uniform(0.1), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
     let systems = [Spheres::new(&classes, &visible)];
-    let view = View { rays: &rays, systems: &systems, paint: &White, lights: &lights };
+    let view = View { rays: &rays, systems: &systems, paint: &White, lights: &lights, casters: &[] };
     assert!(render(view, settings(1), &|_, _| false).is_none());
 }
 

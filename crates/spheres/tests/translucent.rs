@@ -156,7 +156,7 @@ fn picture(
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
     let systems = [Spheres::new(&classes, &visible)];
     let rays = rays();
-    let view = View { rays: &rays, systems: &systems, paint, lights };
+    let view = View { rays: &rays, systems: &systems, paint, lights, casters: &[] };
     let level = Level::new();
     let finer = Finer::default();
     let settings = Settings { size: SIZE, samples: 4, primary, packet, layers: true, finer, level };

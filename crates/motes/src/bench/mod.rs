@@ -1,5 +1,5 @@
 //! Measurements: the tables of Gribble et al. 2007 on sets of like size and structure, those of Zirr &
-//! Dachsbacher 2015, and one line for any source.
+//! Dachsbacher 2015 and of the others, and one line for any source.
 //!
 //! Every time stands beside a hash of its picture, so that a faster wrong picture shows, and what is
 //! compared is measured in turns, so that a busy machine slows all of it alike.
@@ -8,12 +8,14 @@
 //! - [`spheres_source`]: one source, frames of a turning camera (`source`)
 //! - [`surface_tables`], [`surface_source`]: the same for liquids (`surface`)
 //! - [`density_tables`], [`density_source`]: Yasuda et al. 2009 (`density`)
+//! - [`sections_tables`], [`sections_source`]: Chaudhari's cuts (`sections`)
 //! - `draw`: one loop over packets for every way of finding what a ray hits first
 //! - `standard_grid`, `single_ray`: what the paper compares with; they live here only
 
 mod density;
 mod draw;
 mod paper;
+mod sections;
 mod sets;
 mod shot;
 mod single_ray;
@@ -33,6 +35,7 @@ pub use density::{
     SOURCE_STAGES as DENSITY_STAGES, STAGES as DENSITY_TABLES, density_source, density_tables,
 };
 pub use paper::{STAGES as TABLES, Tables, spheres_tables};
+pub use sections::{STAGES as SECTION_STAGES, sections_source, sections_tables};
 pub use source::{Line, STAGES, Source, peer_view, spheres_source};
 pub use surface::{
     SOURCE_STAGES as SURFACE_STAGES, STAGES as SURFACE_TABLES, surface_defaults, surface_source,

@@ -64,7 +64,7 @@ impl Studio {
     pub fn draw(&self, shot: Shot<'_>) -> Counts {
         let Shot { rays, paint, lights, .. } = shot;
         let systems = [shot.spheres];
-        let view = View { rays, systems: &systems, paint, lights };
+        let view = View { rays, systems: &systems, paint, lights, casters: &[] };
         let settings = Settings {
             size: self.size,
             samples: shot.samples,

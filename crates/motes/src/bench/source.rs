@@ -226,7 +226,8 @@ impl Bench {
         let classes = Arc::new(classes);
         let paint = Arc::new(crate::paint::Paint::new(particles, system, None)?);
         let particles = Arc::clone(particles);
-        Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint }))
+        let caps = Arc::default();
+        Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint, caps }))
     }
 
     fn origin(&self) -> DVec3 {

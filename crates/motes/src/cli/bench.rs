@@ -1,8 +1,8 @@
 //! `motes bench`: the papers' tables, or one line for a source.
 
 use motes::bench::{
-    Line, Source, Table, Tables, density_source, density_tables, peer_view, spheres_source,
-    spheres_tables, surface_defaults, surface_source, surface_tables,
+    Line, Source, Table, Tables, density_source, density_tables, peer_view, sections_source,
+    sections_tables, spheres_source, spheres_tables, surface_defaults, surface_source, surface_tables,
 };
 use motes::{Error, Scene};
 
@@ -18,13 +18,14 @@ Examples:
   motes bench spheres --source demo:dam:1e6 --peer-view --json
   motes bench surface --scale 0.1 --stages table2,fig8   liquids: the paper's views, on smaller sets
   motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json
-  motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64";
+  motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64
+  motes bench sections --scale 0.1                       cuts: frames, and planes that come, move and go";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, arg_required_else_help = true, args_override_self = true)]
 pub(crate) struct Args {
-    /// The way of seeing: spheres, surface or density
+    /// The way of seeing: spheres, surface or density; or sections
     #[arg(value_name = "METHOD", hide_possible_values = true)]
     method: Method,
     /// Measure this source; without it, the paper's sets
@@ -63,15 +64,10 @@ enum Method {
     Spheres,
     Surface,
     Density,
-    #[value(hide = true)]
     Sections,
 }
 
 impl Method {
-    fn name(self) -> String {
-        format!("{self:?}").to_lowercase()
-    }
-
     /// Pixels of a picture where nothing is said: the papers' (§5 of both).
     fn size(self) -> [u32; 2] {
         match self {
@@ -83,12 +79,6 @@ impl Method {
 }
 
 pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
-    if args.method == Method::Sections {
-        let name = args.method.name();
-        return Err(Failure::usage(format!(
-            "bench {name}: not in this version; there are spheres, surface and density"
-        )));
-    }
     if args.frames == 0 {
         return Err(Failure::usage("--frames 0: expected 1 or more"));
     }
@@ -104,7 +94,8 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             let line = match args.method {
                 Method::Surface => surface_source(options, &meter)?,
                 Method::Density => density_source(options, &meter)?,
-                _ => spheres_source(options, &meter)?,
+                Method::Sections => sections_source(options, &meter)?,
+                Method::Spheres => spheres_source(options, &meter)?,
             };
             if args.json { json(&line)? } else { one_line(&line) }
         }
@@ -113,7 +104,8 @@ pub(crate) fn run(args: &Args, talk: Talk) -> Result<(), Failure> {
             let tables = match args.method {
                 Method::Surface => surface_tables(&options, &meter)?,
                 Method::Density => density_tables(&options, &meter)?,
-                _ => spheres_tables(&options, &meter)?,
+                Method::Sections => sections_tables(&options, &meter)?,
+                Method::Spheres => spheres_tables(&options, &meter)?,
             };
             let text = || tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n");
             if args.json { json(&tables)? } else { text() }

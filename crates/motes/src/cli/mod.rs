@@ -6,6 +6,7 @@ mod info;
 mod meter;
 mod render;
 mod scene;
+mod section;
 mod simulate;
 mod talk;
 mod values;
@@ -53,6 +54,8 @@ enum Verb {
     View(Box<view::Args>),
     /// Print the scene: every parameter, its default and its meaning
     Scene(scene::Args),
+    /// Cut along a line drawn on the picture
+    Section(section::Args),
     /// Simulate a liquid and write its frames
     Simulate(simulate::Args),
     /// Measure: the papers' tables, or one source
@@ -92,6 +95,7 @@ fn run(cli: Cli) -> Result<(), Failure> {
         Verb::Render(args) => render::run(&args, cli.talk),
         Verb::View(args) => view::run(&args, cli.talk),
         Verb::Scene(args) => scene::run(&args),
+        Verb::Section(args) => section::run(&args, cli.talk),
         Verb::Simulate(args) => simulate::run(&args, cli.talk),
         Verb::Bench(args) => bench::run(&args, cli.talk),
         Verb::Completions { shell } => {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motes::{
-    Film, FilmSettings, Layers, Picture, Scene, SceneError, Session, Shot, built_in_scene,
+    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Section, Session, Shot, built_in_scene,
     is_picture, read_scene,
 };
 
@@ -109,6 +109,12 @@ struct Look {
     /// Show only particles such as 'Mass > 2'
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     r#where: Option<String>,
+    /// Cut: a point, and a normal to what is kept
+    #[arg(long, value_name = "PX,PY,PZ,NX,NY,NZ", allow_hyphen_values = true)]
+    section: Vec<String>,
+    /// How sections cut: caps, open or centre [default: caps]
+    #[arg(long, value_name = "HOW")]
+    cut: Option<String>,
 }
 
 /// Where the camera stands and how it looks.
@@ -374,10 +380,32 @@ impl SceneFlags {
         set_flags(scene, more)?;
         set_flags(scene, &look.camera.typed())?;
         self.overlay.edit(scene)?;
+        for section in &look.section {
+            scene.section.push(plane(section)?);
+        }
+        if look.cut.is_some() && scene.section.is_empty() {
+            return Err(Failure::usage("--cut: there is nothing to cut with; --section is a plane"));
+        }
+        set_flags(scene, &[("--cut", "section.cut", &look.cut)])?;
         for assignment in &self.set {
             scene.set_text(assignment).map_err(|e| Failure::usage(format!("--set: {e}")))?;
         }
         Ok(())
+    }
+}
+
+/// A section from a point and a normal.
+fn plane(text: &str) -> Result<Section, Failure> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([px, py, pz, nx, ny, nz]) => Ok(Section {
+            point: [*px, *py, *pz].into(),
+            normal: [*nx, *ny, *nz].into(),
+            ..Section::default()
+        }),
+        _ => Err(Failure::usage(format!(
+            "--section: expected a point and a normal, PX,PY,PZ,NX,NY,NZ, found {text}"
+        ))),
     }
 }
 

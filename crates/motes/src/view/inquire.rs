@@ -65,7 +65,7 @@ fn sphere_at<'a>(
     (origin, direction): (Vec3, Vec3),
     about: DVec3,
 ) -> Option<Found<'a>> {
-    let entries = Entries::new(loaded);
+    let entries = Entries::new(loaded, &motes_scene::Light::default());
     let mut packet = Packet::new();
     packet.push(origin, direction);
     dispatch!(Level::new(), simd =>
