@@ -13,6 +13,7 @@
 
 mod annotate;
 pub mod bench;
+mod cues;
 mod density;
 mod environment;
 mod error;

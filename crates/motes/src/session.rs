@@ -21,7 +21,7 @@ use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::scenery::Others;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::system::Loaded;
+use crate::system::{Loaded, asks_for_ages};
 use crate::{Error, Result};
 
 /// Whether a picture carries depth, normal, id and system besides colour.
@@ -105,7 +105,9 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let mut series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let aged = series.iter_mut().zip(&scene.system).filter(|(_, s)| asks_for_ages(s));
+        aged.for_each(|(series, _)| series.add_ages());
         let ranges = vec![None; series.len()];
         let spare = series.iter().map(|_| RadiusClasses::default()).collect();
         Ok(Self { scene, series, pool, spare, film: false, ranges, notes: Vec::new() })
@@ -203,8 +205,10 @@ impl Session {
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
-        // Lines in space are hidden by depth.
-        let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
+        // Lines in space are hidden by depth, and cues come from all layers.
+        let layers = layers == Layers::Yes
+            || scene.cue.any()
+            || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
         let raw = match self.scene.renderer {
             Renderer::Spheres => {
@@ -219,7 +223,7 @@ impl Session {
 
         let start = Instant::now();
         let annotated = Annotated { systems: &loaded, frame, film: self.film };
-        let shown = self.finish(&raw, &resolved, &annotated);
+        let shown = self.finish(&raw, &resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         count(&mut stats, &loaded);
         stats.hash = format!("{:016x}", raw.hash());
@@ -427,8 +431,13 @@ impl Session {
         if layers { with_layers(frame, &traced.center, loaded) } else { Ok(frame) }
     }
 
-    /// Tone, background and annotations.
-    fn finish(&self, raw: &Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
+    /// Tone, cues, background and annotations.
+    fn finish(
+        &self,
+        raw: &Frame,
+        resolved: &Resolved,
+        annotated: &Annotated<'_>,
+    ) -> Result<Frame> {
         let image = &self.scene.image;
         let mut shown = raw.clone();
         let curve = match image.tone {
@@ -436,6 +445,7 @@ impl Session {
             motes_scene::Tone::Filmic => Curve::Filmic,
         };
         Tone { exposure: image.exposure as f32, curve }.apply(&mut shown);
+        crate::cues::draw(&self.scene.cue, resolved, annotated.systems, &mut shown)?;
         let background = match (image.transparent, image.background_bottom) {
             (true, _) => Background::Transparent,
             (false, None) => Background::Solid(resolved.background.top.to_array()),
@@ -446,7 +456,7 @@ impl Session {
         };
         background.put_behind(&mut shown);
         annotations(&self.scene, resolved, annotated).draw(&mut shown);
-        shown
+        Ok(shown)
     }
 }
 
@@ -488,6 +498,7 @@ pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     let by = match &system.color.by {
         ColorBy::Auto => vec![names::COLOR, ALPHA],
         ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
+        ColorBy::Residue => vec![names::RESIDUE_NAME],
         ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
         ColorBy::Property(_) => return Wanted::All,
     };

@@ -6,6 +6,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::color::Color;
+use crate::cue::Cue;
 use crate::density::Density;
 use crate::settings::{Setting, Shape, settings, words};
 use crate::surface::Surface;
@@ -33,6 +34,8 @@ settings! {
         density: Density = Density::default(),
         /// The simulation of liquids, for sim: sources.
         sph: Sph = Sph::default(),
+        /// Cues of depth and structure, drawn into the picture.
+        cue: Cue = Cue::default(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
     }
@@ -83,7 +86,7 @@ settings! {
 settings! {
     /// How particles get their colours.
     pub struct Coloring {
-        /// auto (the file's colours, else element, else type, else uniform), uniform, element, type, chain, or the name of a property.
+        /// auto (the file's colours, else element, else type, else uniform), uniform, element, type, chain, residue, or the name of a property.
         by: ColorBy = ColorBy::Auto,
         /// Which component of a vector property.
         component: Component = Component::Magnitude,
@@ -450,6 +453,8 @@ pub enum ColorBy {
     Type,
     /// The chain or molecule (the palette).
     Chain,
+    /// The residue's name (RasMol's colours of amino acids and nucleotides, else the palette).
+    Residue,
     /// The property of this name, through the colour map.
     Property(String),
 }
@@ -462,6 +467,7 @@ impl From<String> for ColorBy {
             "element" => Self::Element,
             "type" => Self::Type,
             "chain" => Self::Chain,
+            "residue" => Self::Residue,
             _ => Self::Property(word),
         }
     }
@@ -475,6 +481,7 @@ impl From<ColorBy> for String {
             ColorBy::Element => "element".into(),
             ColorBy::Type => "type".into(),
             ColorBy::Chain => "chain".into(),
+            ColorBy::Residue => "residue".into(),
             ColorBy::Property(name) => name,
         }
     }
@@ -482,7 +489,7 @@ impl From<ColorBy> for String {
 
 impl Setting for ColorBy {
     fn shape() -> Shape {
-        Shape::Value("auto, uniform, element, type, chain, or the name of a property".into())
+        Shape::Value("auto, uniform, element, type, chain, residue, or the name of a property".into())
     }
 }
 

@@ -81,6 +81,9 @@ struct Look {
     /// Go around the target in a film
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     turn: Option<String>,
+    /// edges,depth,halo,rim,seam, or sprite
+    #[arg(long, value_name = "NAMES")]
+    cue: Option<String>,
     /// studio, soft, sun, overcast, side, …
     #[arg(long, value_name = "NAME")]
     light: Option<String>,
@@ -90,7 +93,7 @@ struct Look {
     /// Factor on every radius
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     radius_scale: Option<String>,
-    /// Property, or element, type, chain, uniform
+    /// Property, or element, type, chain, residue, …
     #[arg(long, value_name = "NAME")]
     color_by: Option<String>,
     /// viridis, magma, turbo, batlow, coolwarm, …
@@ -359,6 +362,7 @@ impl Args {
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
             ("--turn", "camera.turn", &look.turn),
+            ("--cue", "cue.on", &look.cue),
             ("--light", "light.preset", &look.light),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
