@@ -14,6 +14,7 @@
 mod annotate;
 pub mod bench;
 mod caps;
+mod cues;
 mod cut;
 mod density;
 mod drawing;

@@ -20,7 +20,7 @@ use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::system::Loaded;
+use crate::system::{Loaded, asks_for_ages};
 use crate::{Error, Result};
 
 /// Whether a picture carries depth, normal, id and system besides colour.
@@ -134,8 +134,10 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let series = scene.system.iter().map(|s| Ok(Arc::new(Mutex::new(open(&s.source)?))));
-        let series = series.collect::<Result<Vec<_>>>()?;
+        let mut series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let aged = series.iter_mut().zip(&scene.system).filter(|(_, s)| asks_for_ages(s));
+        aged.for_each(|(series, _)| series.add_ages());
+        let series = series.into_iter().map(|series| Arc::new(Mutex::new(series))).collect();
         Ok(Self { pool, ..Self::of(scene, series) })
     }
 
@@ -171,7 +173,12 @@ impl Session {
         if sources(&scene) != sources(&self.scene) {
             return Err(Error::Usage("the scene has other sources than those that are open".into()));
         }
-        self.scene = scene;
+        let before = std::mem::replace(&mut self.scene, scene);
+        for (i, system) in self.scene.system.iter().enumerate() {
+            if asks_for_ages(system) && !asks_for_ages(&before.system[i]) {
+                lock(&self.series[i]).add_ages();
+            }
+        }
         Ok(())
     }
 
@@ -266,7 +273,7 @@ impl Session {
         let start = Instant::now();
         let annotated =
             Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
-        let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated);
+        let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         stats.hash = format!("{:016x}", drawn.raw.hash());
         stats.peak_memory = peak_memory_bytes();
@@ -290,7 +297,7 @@ impl Session {
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
         let annotated = Annotated { systems: &loaded, frame, film: self.film };
-        let shown = self.finish(raw, &resolved, &annotated);
+        let shown = self.finish(raw, &resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, origin } })
     }
@@ -330,8 +337,10 @@ impl Session {
 
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
-        // Lines in space are hidden by depth.
-        let layers = layers == Layers::Yes || loaded.iter().any(|l| l.sim_box.is_some());
+        // Lines in space are hidden by depth, and cues come from all layers.
+        let layers = layers == Layers::Yes
+            || scene.cue.any()
+            || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
         let drawing = Drawing {
             scene: &self.scene,
@@ -496,8 +505,13 @@ impl Session {
         Ok(all)
     }
 
-    /// Tone, background and annotations.
-    fn finish(&self, raw: Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
+    /// Tone, cues, background and annotations.
+    fn finish(
+        &self,
+        raw: Frame,
+        resolved: &Resolved,
+        annotated: &Annotated<'_>,
+    ) -> Result<Frame> {
         let image = &self.scene.image;
         let mut shown = raw;
         let curve = match image.tone {
@@ -505,6 +519,7 @@ impl Session {
             motes_scene::Tone::Filmic => Curve::Filmic,
         };
         Tone { exposure: image.exposure as f32, curve }.apply(&mut shown);
+        crate::cues::draw(&self.scene.cue, resolved, annotated.systems, &mut shown)?;
         let background = match (image.transparent, image.background_bottom) {
             (true, _) => Background::Transparent,
             (false, None) => Background::Solid(resolved.background.top.to_array()),
@@ -515,7 +530,7 @@ impl Session {
         };
         background.put_behind(&mut shown);
         annotations(&self.scene, resolved, annotated).draw(&mut shown);
-        shown
+        Ok(shown)
     }
 }
 
@@ -601,6 +616,7 @@ pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     let by = match &system.color.by {
         ColorBy::Auto => vec![names::COLOR, ALPHA],
         ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
+        ColorBy::Residue => vec![names::RESIDUE_NAME],
         ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
         ColorBy::Property(_) => return Wanted::All,
     };

@@ -172,6 +172,14 @@ pub(crate) fn visibility(
     Ok(classes.grids.iter().map(of_grid).collect())
 }
 
+/// Whether colours or what is visible go by the particles' ages.
+pub(crate) fn asks_for_ages(system: &System) -> bool {
+    let is_age = |name: &str| names::same(name, names::AGE);
+    let colored = matches!(&system.color.by, ColorBy::Property(name) if is_age(name));
+    let mut words = system.r#where.split(|c: char| !c.is_alphanumeric() && c != '_');
+    colored || words.any(is_age) || system.filter.iter().any(|filter| is_age(&filter.property))
+}
+
 /// Whether colours or what is visible go by the particles' positions.
 pub(crate) fn asks_for_positions(particles: &Particles, (scene, system): (&Scene, &System)) -> bool {
     let by_position =

@@ -88,6 +88,9 @@ struct Look {
     background: Option<String>,
     #[command(flatten)]
     camera: CameraFlags,
+    /// edges,depth,halo,rim,seam, or sprite
+    #[arg(long, value_name = "NAMES")]
+    cue: Option<String>,
     /// studio, soft, sun, overcast, side, …
     #[arg(long, value_name = "NAME")]
     light: Option<String>,
@@ -97,7 +100,7 @@ struct Look {
     /// Factor on every radius
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     radius_scale: Option<String>,
-    /// Property, or element, type, chain, uniform
+    /// Property, or element, type, chain, residue, …
     #[arg(long, value_name = "NAME")]
     color_by: Option<String>,
     /// viridis, magma, turbo, batlow, coolwarm, …
@@ -368,6 +371,7 @@ impl SceneFlags {
             ("--samples", "image.samples", &samples),
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
+            ("--cue", "cue.on", &look.cue),
             ("--light", "light.preset", &look.light),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
