@@ -1,9 +1,11 @@
-//! The smoothing kernel: Wendland's C² function in three dimensions.
+//! The smoothing kernel: a polynomial in the square of the distance, near to a Gaussian.
 //!
-//! W(r) = A w⁴ (1 + 4q),  ∇W = −C w³ d,  q = r/h,  w = max(1 − q, 0),  A = 21 / (2π h³),  C = 20 A / h²
+//! W(r) = A w⁵,  ∇W = −C w⁴ d,  w = max(1 − d², 0),  A = 9009 / (1024 π h³),  C = 10 A / h
 //!
-//! where d is the vector to the particle from its neighbour and h the support (Wendland 1995; for SPH:
-//! Dehnen & Aly 2012). The gradient needs no division, and W never makes pairs clump.
+//! where h is the support and d the vector to the particle from its neighbour, in supports. It is as wide as
+//! Wendland's C² function of the same support (standard deviations 0.258 h and 0.264 h), and needs
+//! neither root nor division. Its transform is positive up to a wave number of 10.4 / h, past the shortest waves along
+//! the rows of a lattice of h/2, so that pairs do not clump (Dehnen & Aly 2012, §2.5).
 
 use std::f64::consts::PI;
 
@@ -14,21 +16,20 @@ pub(crate) struct Kernel {
     pub support: f32,
     /// A, per cubic metre.
     pub value: f32,
-    /// C.
+    /// C, for d in supports.
     pub slope: f32,
 }
 
 impl Kernel {
     pub fn new(support: f32) -> Self {
         let h = f64::from(support);
-        let value = 21.0 / (2.0 * PI * h.powi(3));
-        Self { support, value: value as f32, slope: (20.0 * value / (h * h)) as f32 }
+        let value = 9009.0 / (1024.0 * PI * h.powi(3));
+        Self { support, value: value as f32, slope: (10.0 * value / h) as f32 }
     }
 
     /// W / A at distance `r`.
     pub fn shape(&self, r: f64) -> f64 {
-        let w = (1.0 - r / f64::from(self.support)).max(0.0);
-        w.powi(4) * (5.0 - 4.0 * w)
+        (1.0 - (r / f64::from(self.support)).powi(2)).max(0.0).powi(5)
     }
 
     /// Σ W / A over a square lattice of `spacing`, seen from `away` above one of its points.
@@ -68,8 +69,8 @@ mod tests {
         for r in [0.1, 0.5, 1.0, 1.7, 1.99] {
             let e = 1e-5;
             let difference = (kernel.shape(r + e) - kernel.shape(r - e)) / (2.0 * e);
-            let w = 1.0 - r / 2.0;
-            let slope = -f64::from(kernel.slope / kernel.value) * w.powi(3) * r;
+            let d: f64 = r / 2.0;
+            let slope = -f64::from(kernel.slope / kernel.value) * (1.0 - d * d).powi(4) * d;
             assert!((difference - slope).abs() < 1e-6, "{r}: {difference} {slope}");
         }
         assert_eq!(kernel.shape(2.0), 0.0);

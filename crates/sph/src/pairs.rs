@@ -7,11 +7,11 @@
 //! even planes are worked at in parallel, then all odd ones, and every sum is made in the same order for
 //! any number of threads.
 //!
-//! Every contribution carries a factor w = 1 − r/h, which is 0 from the support on; so no pair needs a
-//! test.
+//! Lengths are in supports, as seen from the cell. Every contribution carries a factor
+//! w = 1 − (r/h)², no less than 0; so no pair needs a test, and none a root.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, dispatch, f32x8, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
@@ -22,8 +22,6 @@ use crate::walls::Walls;
 pub(crate) const LANES: usize = 16;
 /// A coordinate out of everything's reach, whose square is still finite.
 const FAR: f32 = 1e15;
-/// The squared distance of those.
-const FAR_SQUARE: f32 = 1e30;
 
 /// The length of rows for `count` particles: a vector may be read from any of them.
 pub(crate) fn padded(count: usize) -> usize {
@@ -33,30 +31,37 @@ pub(crate) fn padded(count: usize) -> usize {
 /// Sixteen neighbours of a particle, as seen from it.
 #[derive(Clone, Copy)]
 pub(crate) struct Apart<S: Simd> {
-    /// d, from the neighbour to the particle.
+    /// d, from the neighbour to the particle, in supports.
     pub d: [f32x16<S>; 3],
-    /// r².
-    pub square: f32x16<S>,
-    /// w = max(1 − r/h, 0).
+    /// w = max(1 − d², 0).
     pub w: f32x16<S>,
 }
 
+/// What a particle gets from sixteen neighbours: a factor, which vanishes with w, and what it is of.
+pub(crate) type Found<S, const OUT: usize> = (f32x16<S>, [f32x16<S>; OUT]);
+
 /// What a pass adds up over pairs: `OUT` sums from `IN` numbers of each particle.
 pub(crate) trait Pair<const IN: usize, const OUT: usize>: Copy + Send + Sync {
-    /// Whether the partner gets the same (+1) or the opposite (−1).
+    /// Whether the partner gets the same (+1), the opposite (−1), or nobody anything but from walls (0).
     const SIGN: [f32; OUT];
+    /// Whether there are registers for four particles at a time.
+    const FOUR: bool = false;
 
-    /// What particle i gets from j. Must vanish with w.
+    /// What the numbers of particles are multiplied by before anything else.
+    fn units(self) -> [f32; IN] {
+        [1.0; IN]
+    }
+
+    /// What particle i gets from j.
     fn pair<S: Simd>(
         self,
         at: Apart<S>,
         i: [f32x16<S>; IN],
         j: [f32x16<S>; IN],
-    ) -> [f32x16<S>; OUT];
+    ) -> Found<S, OUT>;
 
     /// What particle i gets from a sample of the wall of weight ψ/m.
-    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], weight: f32x16<S>)
-    -> [f32x16<S>; OUT];
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], weight: f32x16<S>) -> Found<S, OUT>;
 }
 
 /// Particles in cell order, and how to go about them.
@@ -193,17 +198,23 @@ fn plane<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
         let runs = runs(lattice, all.starts, cell);
         let total: usize = runs.iter().map(|(from, to)| to - from).sum();
         desk.reserve(total);
-        load(simd, all, inputs, (&runs, total), desk);
-        let near_wall = all.walls.near(cell);
-        let wall_count = if near_wall { load_walls(simd, all, cell, desk) } else { 0 };
+        let view = View::new(simd, all, first);
+        load(view, all, (pair, inputs), (&runs, total), desk);
+        let walls = if all.walls.near(cell) { load_walls(view, all, cell, desk) } else { 0 };
         let own = end - first;
         desk.own.iter_mut().for_each(|row| row.resize(own, 0.0));
-        // Two at a time read and write the buffer once.
-        for k in (0..own - own % 2).step_by(2) {
-            some::<_, _, 2, _, _>(simd, all.support, pair, (k, total, wall_count), desk);
+        // Several at a time read and write the buffer once.
+        let mut k = 0;
+        while P::FOUR && k + 4 <= own {
+            some::<_, _, 4, _, _>(simd, pair, (k, total, walls), desk);
+            k += 4;
         }
-        if own % 2 == 1 {
-            some::<_, _, 1, _, _>(simd, all.support, pair, (own - 1, total, wall_count), desk);
+        while k + 2 <= own {
+            some::<_, _, 2, _, _>(simd, pair, (k, total, walls), desk);
+            k += 2;
+        }
+        if k < own {
+            some::<_, _, 1, _, _>(simd, pair, (k, total, walls), desk);
         }
         store(simd, (&runs, task.first), desk, &mut task.sums);
     }
@@ -223,25 +234,69 @@ fn runs(lattice: &Lattice, starts: &[u32], cell: usize) -> [(usize, usize); 5] {
     ]
 }
 
+/// From where the particles of a cell and those about it are seen, and in which unit.
+#[derive(Clone, Copy)]
+struct View<S: Simd> {
+    simd: S,
+    origin: [f32x16<S>; 3],
+    per_length: f32x16<S>,
+}
+
+impl<S: Simd> View<S> {
+    #[inline(always)]
+    fn new(simd: S, all: &Neighbors<'_>, first: usize) -> Self {
+        let mut origin = [f32x16::splat(simd, 0.0); 3];
+        for axis in 0..3 {
+            origin[axis] = f32x16::splat(simd, all.positions[axis][first]);
+        }
+        Self { simd, origin, per_length: f32x16::splat(simd, 1.0 / all.support) }
+    }
+
+    /// Copies a run of coordinates, in whole vectors: what is too much is overwritten.
+    #[inline(always)]
+    fn coordinates(self, axis: usize, from: &[f32], to: &mut [f32]) {
+        for (to, from) in to.chunks_exact_mut(LANES).zip(from.chunks_exact(LANES)) {
+            let from = f32x16::from_slice(self.simd, from);
+            ((from - self.origin[axis]) * self.per_length).store_slice(to);
+        }
+    }
+
+    /// Copies a run of other numbers, `unit` times.
+    #[inline(always)]
+    fn numbers(self, unit: f32, from: &[f32], to: &mut [f32]) {
+        for (to, from) in to.chunks_exact_mut(LANES).zip(from.chunks_exact(LANES)) {
+            (f32x16::from_slice(self.simd, from) * unit).store_slice(to);
+        }
+    }
+}
+
 /// Copies the runs into the buffer, and clears its sums.
 #[inline(always)]
-fn load<S: Simd, const IN: usize, const OUT: usize>(
-    simd: S,
+fn load<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+    view: View<S>,
     all: &Neighbors<'_>,
-    inputs: &[&[f32]; IN],
+    (pair, inputs): (P, &[&[f32]; IN]),
     (runs, total): (&[(usize, usize); 5], usize),
     desk: &mut Desk<IN, OUT>,
 ) {
-    for axis in 0..3 {
-        copy(simd, all.positions[axis], runs, &mut desk.positions[axis]);
-    }
-    for k in 0..IN {
-        copy(simd, inputs[k], runs, &mut desk.inputs[k]);
+    let mut at = 0;
+    for (from, end) in runs {
+        let wide = (end - from).next_multiple_of(LANES);
+        let (run, to) = (*from..from + wide, at..at + wide);
+        for axis in 0..3 {
+            let to = &mut bytemuck::cast_slice_mut(&mut desk.positions[axis])[to.clone()];
+            view.coordinates(axis, &all.positions[axis][run.clone()], to);
+        }
+        for n in 0..IN {
+            let to = &mut bytemuck::cast_slice_mut(&mut desk.inputs[n])[to.clone()];
+            view.numbers(pair.units()[n], &inputs[n][run.clone()], to);
+        }
+        at += end - from;
     }
     let vectors = total.div_ceil(LANES);
     bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.positions[0])[total..vectors * LANES]
         .fill(FAR);
-    let zero = f32x16::splat(simd, 0.0);
+    let zero = f32x16::splat(view.simd, 0.0);
     for o in 0..OUT {
         for v in &mut desk.sums[o][..vectors] {
             zero.store_slice(&mut v.0);
@@ -249,26 +304,10 @@ fn load<S: Simd, const IN: usize, const OUT: usize>(
     }
 }
 
-/// Copies runs of `row` behind each other, in whole vectors: what is too much is overwritten.
-#[inline(always)]
-fn copy<S: Simd>(simd: S, row: &[f32], runs: &[(usize, usize)], to: &mut [Sixteen]) {
-    let to: &mut [f32] = bytemuck::cast_slice_mut(to);
-    let mut at = 0;
-    for (from, end) in runs {
-        let (mut from, mut put) = (*from, at);
-        at += end - from;
-        while put < at {
-            f32x16::from_slice(simd, &row[from..from + LANES])
-                .store_slice(&mut to[put..put + LANES]);
-            (from, put) = (from + LANES, put + LANES);
-        }
-    }
-}
-
 /// Copies the samples of walls about `cell`; how many there are.
 #[inline(always)]
 fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
-    simd: S,
+    view: View<S>,
     all: &Neighbors<'_>,
     cell: usize,
     desk: &mut Desk<IN, OUT>,
@@ -282,14 +321,23 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
         *run = (walls.starts[middle - 1] as usize, walls.starts[middle + 2] as usize);
         total += run.1 - run.0;
     }
-    if total > 0 {
-        desk.reserve_walls(total);
+    desk.reserve_walls(total);
+    let mut at = 0;
+    for (from, end) in runs {
+        let wide = (end - from).next_multiple_of(LANES);
         for k in 0..4 {
-            copy(simd, &walls.rows[k], &runs, &mut desk.walls[k]);
+            let to = &mut bytemuck::cast_slice_mut(&mut desk.walls[k])[at..at + wide];
+            let from = &walls.rows[k][from..from + wide];
+            if k < 3 {
+                view.coordinates(k, from, to);
+            } else {
+                view.numbers(1.0, from, to);
+            }
         }
-        let end = total.next_multiple_of(LANES);
-        bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.walls[0])[total..end].fill(FAR);
+        at += end - from;
     }
+    let end = total.next_multiple_of(LANES);
+    bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.walls[0])[total..end].fill(FAR);
     total
 }
 
@@ -298,7 +346,6 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
 #[inline(always)]
 fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: usize>(
     simd: S,
-    support: f32,
     pair: P,
     (k, total, wall_count): (usize, usize, usize),
     desk: &mut Desk<IN, OUT>,
@@ -320,36 +367,36 @@ fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: u
     let inputs = desk.inputs.each_ref().map(|row| &row[rest.clone()]);
     let outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
     for v in 0..rest.len() {
-        let mut j = [zero; IN];
+        let (mut j, mut theirs) = ([zero; IN], [zero; OUT]);
         for n in 0..IN {
             j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
         }
-        let mut theirs = [zero; OUT];
+        for o in 0..OUT {
+            theirs[o] = f32x16::from_slice(simd, &outputs[o][v].0);
+        }
         for m in 0..M {
             let mut at = apart(simd, place[m], [x, y, z], v);
             if v == 0 {
-                at.square = met[m].select(f32x16::splat(simd, FAR_SQUARE), at.square);
+                at.w = met[m].select(zero, at.w);
             }
-            at.w = weight(at.square, support);
-            let found = pair.pair(at, i[m], j);
+            let (t, found) = pair.pair(at, i[m], j);
             for o in 0..OUT {
-                sums[m][o] += found[o];
-                theirs[o] += found[o];
+                if P::SIGN[o] != 0.0 {
+                    let t_theirs = if P::SIGN[o] < 0.0 { -t } else { t };
+                    sums[m][o] = t.mul_add(found[o], sums[m][o]);
+                    theirs[o] = t_theirs.mul_add(found[o], theirs[o]);
+                }
             }
         }
         for o in 0..OUT {
-            let to = &mut outputs[o][v].0;
-            let before = f32x16::from_slice(simd, to);
-            let after = if P::SIGN[o] < 0.0 { before - theirs[o] } else { before + theirs[o] };
-            after.store_slice(to);
+            if P::SIGN[o] != 0.0 {
+                theirs[o].store_slice(&mut outputs[o][v].0);
+            }
         }
     }
     for m in 0..M {
         if wall_count > 0 {
-            let walls = one_wall(simd, support, pair, (k + m, wall_count), desk);
-            for o in 0..OUT {
-                sums[m][o] += walls[o];
-            }
+            at_walls(simd, pair, (place[m], i[m], wall_count), desk, &mut sums[m]);
         }
         for o in 0..OUT {
             desk.own[o][k + m] = sums[m][o].reduce_sum();
@@ -357,30 +404,24 @@ fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: u
     }
 }
 
-/// The sums of particle `k` of the cell over samples of walls.
+/// Adds up over samples of walls.
 #[inline(always)]
-fn one_wall<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+fn at_walls<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     simd: S,
-    support: f32,
     pair: P,
-    (k, total): (usize, usize),
+    (place, i, total): ([f32x16<S>; 3], [f32x16<S>; IN], usize),
     desk: &Desk<IN, OUT>,
-) -> [f32x16<S>; OUT] {
-    let (vector, lane) = (k / LANES, k % LANES);
-    let place = of_buffer(simd, &desk.positions, (vector, lane));
-    let i = of_buffer(simd, &desk.inputs, (vector, lane));
-    let mut sums = [f32x16::splat(simd, 0.0); OUT];
+    sums: &mut [f32x16<S>; OUT],
+) {
     let vectors = total.div_ceil(LANES);
     let [x, y, z, weights] = desk.walls.each_ref().map(|row| &row[..vectors]);
     for v in 0..vectors {
-        let mut at = apart(simd, place, [x, y, z], v);
-        at.w = self::weight(at.square, support);
-        let found = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
+        let at = apart(simd, place, [x, y, z], v);
+        let (t, found) = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
         for o in 0..OUT {
-            sums[o] += found[o];
+            sums[o] = t.mul_add(found[o], sums[o]);
         }
     }
-    sums
 }
 
 /// The numbers of one particle of the buffer, sixteen times.
@@ -397,23 +438,16 @@ fn of_buffer<S: Simd, const N: usize>(
     numbers
 }
 
-/// Sixteen neighbours as seen from `place`; w is still to be told.
+/// Sixteen neighbours as seen from `place`.
 #[inline(always)]
 fn apart<S: Simd>(simd: S, place: [f32x16<S>; 3], rows: [&[Sixteen]; 3], v: usize) -> Apart<S> {
-    let zero = f32x16::splat(simd, 0.0);
-    let mut d = [zero; 3];
+    let mut d = [f32x16::splat(simd, 0.0); 3];
+    let mut w = f32x16::splat(simd, 1.0);
     for axis in 0..3 {
         d[axis] = place[axis] - f32x16::from_slice(simd, &rows[axis][v].0);
+        w = (-d[axis]).mul_add(d[axis], w);
     }
-    let square = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
-    Apart { d, square, w: zero }
-}
-
-/// w = max(1 − r/h, 0).
-#[inline(always)]
-fn weight<S: Simd>(square: f32x16<S>, support: f32) -> f32x16<S> {
-    let one = f32x16::splat(square.token(), 1.0);
-    (one - square.sqrt() * (1.0 / support)).max(f32x16::splat(square.token(), 0.0))
+    Apart { d, w: w.max(f32x16::splat(simd, 0.0)) }
 }
 
 /// Brings the sums of the buffer back to their particles.
@@ -425,24 +459,39 @@ fn store<S: Simd, const IN: usize, const OUT: usize>(
     sums: &mut [&mut [f32]; OUT],
 ) {
     for o in 0..OUT {
-        let from: &[f32] = bytemuck::cast_slice(&desk.sums[o]);
         let own = runs[0].0 - first;
         for (to, sum) in sums[o][own..].iter_mut().zip(&desk.own[o]) {
             *to += sum;
         }
-        let mut at = 0;
-        for (begin, end) in runs {
-            let to = &mut sums[o][begin - first..end - first];
-            let run = &from[at..at + to.len()];
-            at += to.len();
-            let mut wide = to.chunks_exact_mut(8);
-            let mut parts = run.chunks_exact(8);
-            for (to, part) in (&mut wide).zip(&mut parts) {
-                (f32x8::from_slice(simd, to) + f32x8::from_slice(simd, part)).store_slice(to);
-            }
-            for (to, part) in wide.into_remainder().iter_mut().zip(parts.remainder()) {
-                *to += part;
-            }
+    }
+    let mut at = 0;
+    for (begin, end) in runs {
+        let (begin, length) = (begin - first, end - begin);
+        for o in 0..OUT {
+            let from: &[f32] = bytemuck::cast_slice(&desk.sums[o]);
+            add(simd, &from[at..], &mut sums[o][begin..], length);
         }
+        at += length;
+    }
+}
+
+/// Adds `length` numbers; the last of them among zeros, where there is room.
+#[inline(always)]
+fn add<S: Simd>(simd: S, from: &[f32], to: &mut [f32], length: usize) {
+    let mut at = 0;
+    while at < length {
+        let left = length - at;
+        let (from, to) = (&from[at..], &mut to[at..]);
+        if to.len() >= LANES {
+            let mut sum = f32x16::from_slice(simd, &from[..LANES]);
+            if left < LANES {
+                let inside = mask32x16::from_bitmask(simd, (1u64 << left) - 1);
+                sum = inside.select(sum, f32x16::splat(simd, 0.0));
+            }
+            (f32x16::from_slice(simd, &to[..LANES]) + sum).store_slice(&mut to[..LANES]);
+        } else {
+            to[..left].iter_mut().zip(from).for_each(|(to, from)| *to += from);
+        }
+        at += LANES;
     }
 }

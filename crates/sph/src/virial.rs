@@ -1,6 +1,6 @@
 //! The pressure that is told: what neighbours pass on to each other, their virial.
 //!
-//! p_i = 1/(3 V) Σ_j ½ F_ij · d_ij = ρ₀/6 · m C Σ_j t (P_i + P_j) r²   (Irving & Kirkwood 1950, Clausius 1870)
+//! p_i = 1/(3 V) Σ_j ½ F_ij · d_ij = ρ₀/6 · m C h Σ_j t (P_i + P_j) r²   (Irving & Kirkwood 1950, Clausius 1870)
 //!
 //! with P = p/ρ² as the solver has it, V = Δ³ the volume of a particle and ρ₀ V its mass. The solver's own
 //! p is what holds its *estimate* of the density, which changes 5 % less than the volume of a lattice two
@@ -22,6 +22,6 @@ pub(crate) fn transmitted(
 ) {
     let virial = Virial { wall: if physics.sph.solver == Solver::Dfsph { 2.0 } else { 1.0 } };
     around.of(fluid, physics).sum(virial, [&fluid.pressure], [&mut *pressure]);
-    let scale = physics.density / 6.0 * physics.mass * physics.kernel.slope;
+    let scale = physics.density / 6.0 * physics.mass * physics.kernel.slope * physics.kernel.support;
     pressure.iter_mut().for_each(|p| *p *= scale);
 }

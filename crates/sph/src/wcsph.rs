@@ -25,11 +25,12 @@ impl Physics {
         self.pressure(density) / (density * density)
     }
 
-    /// The pass of forces, of the pressures as a whole (1) or of walls alone (0); the factor on its sums.
-    pub(crate) fn force(&self, push: f32) -> (Force, f32) {
-        let scale = self.mass * self.kernel.slope;
-        let viscosity = 2.0 * self.viscosity / self.density;
-        (Force { viscosity, push, gravity: self.gravity.map(|g| g / self.density) }, scale)
+    /// The pass of forces, and the factor on its sums.
+    pub(crate) fn force(&self) -> (Force, f32) {
+        let support = self.kernel.support;
+        let viscosity = 2.0 * self.viscosity / (self.density * support);
+        let gravity = self.gravity.map(|g| g * support / self.density);
+        (Force { viscosity, gravity }, self.mass * self.kernel.slope)
     }
 }
 
@@ -62,7 +63,7 @@ impl Simulation {
         stats.compression = parts.iter().sum::<f64>() / n.max(1) as f64;
 
         let [u, v, w] = &fluid.velocity;
-        let (force, scale) = physics.force(1.0);
+        let (force, scale) = physics.force();
         let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
         let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
         around.of(fluid, physics).sum(force, inputs, outputs);
