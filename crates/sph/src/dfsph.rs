@@ -27,8 +27,8 @@ use crate::passes::{Divergence, Drag, Factors, Push};
 use crate::simulation::{Around, Greatest, Physics};
 use crate::wcsph::accelerate;
 
-/// ω: neighbours correct at the same time, and with momentum (0.5 is too much for that).
-const RELAXATION: f32 = 0.3;
+/// ω: neighbours correct at the same time, and with momentum (0.3 is too much for that).
+const RELAXATION: f32 = 0.22;
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
 /// The part of the places' last pressure that velocities begin with as well: what had to be put right there

@@ -1,11 +1,12 @@
 //! Sums over all pairs of particles within the support: the one loop under every pass.
 //!
-//! Each pair is visited once. A cell works with itself and the thirteen cells that come after it among
-//! its neighbours: five runs of the cell order, copied into a buffer that stays in L1. Each particle of
-//! the cell meets the buffer sixteen at a time; what its partners get is added up in the buffer and
-//! brought back at the end. A plane of cells therefore writes to itself and to the next plane: first all
-//! even planes are worked at in parallel, then all odd ones, and every sum is made in the same order for
-//! any number of threads.
+//! Each pair is visited once: a particle meets those after it in its own cell and the next along its row, and
+//! those of three cells of each of the four rows that come after its own. A row of cells is worked at as a whole: its own
+//! particles, and those of the four rows, cell by cell, are copied into buffers that stay in cache. There,
+//! whom a cell meets lies together, and each of its particles meets them sixteen at a time; what partners get is
+//! added up in the buffer and brought back at the end. A plane of cells therefore writes to itself and to
+//! the next plane: first all even planes are worked at in parallel, then all odd ones, and every sum is
+//! made in the same order for any number of threads.
 //!
 //! Lengths are in supports, as seen from the cell. Every contribution carries a factor
 //! w = 1 − (r/h)², no less than 0; so no pair needs a test, and none a root.
@@ -20,6 +21,8 @@ use crate::walls::Walls;
 
 /// Numbers in a vector.
 pub(crate) const LANES: usize = 16;
+/// So few particles are not worth the threads.
+const FEW: u32 = 1 << 11;
 /// A coordinate out of everything's reach, whose square is still finite.
 const FAR: f32 = 1e15;
 
@@ -92,35 +95,59 @@ struct Task<'a, const OUT: usize> {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Sixteen([f32; LANES]);
 
-/// The buffer of a cell.
+/// Particles that are met, and what they get.
 struct Desk<const IN: usize, const OUT: usize> {
     positions: [Vec<Sixteen>; 3],
     inputs: [Vec<Sixteen>; IN],
     sums: [Vec<Sixteen>; OUT],
-    /// The sums of the cell's own particles: not among those of the buffer, as a vector cannot be read
-    /// soon after one of its numbers was written.
-    own: [Vec<f32>; OUT],
-    walls: [Vec<Sixteen>; 4],
+    /// How many there are.
+    count: usize,
 }
 
 impl<const IN: usize, const OUT: usize> Desk<IN, OUT> {
     fn new() -> Self {
-        let row = |_| vec![Sixteen::zeroed(); 16];
         Self {
-            positions: std::array::from_fn(row),
-            inputs: std::array::from_fn(row),
-            sums: std::array::from_fn(row),
-            own: std::array::from_fn(|_| vec![]),
-            walls: std::array::from_fn(row),
+            positions: std::array::from_fn(|_| vec![]),
+            inputs: std::array::from_fn(|_| vec![]),
+            sums: std::array::from_fn(|_| vec![]),
+            count: 0,
         }
     }
 
-    /// Makes room for `count` neighbours.
-    fn reserve(&mut self, count: usize) {
+    /// Makes room for `count` particles, and has none.
+    fn clear(&mut self, count: usize) {
         let need = padded(count) / LANES + 1;
         if self.positions[0].len() < need {
             let rows = self.positions.iter_mut().chain(&mut self.inputs).chain(&mut self.sums);
             rows.for_each(|row| row.resize(need * 2, Sixteen::zeroed()));
+        }
+        self.count = 0;
+    }
+}
+
+/// What a row of cells is worked at with.
+struct Place<const IN: usize, const OUT: usize> {
+    /// Its own particles.
+    own: Desk<IN, OUT>,
+    /// Those of the rows after it, cell by cell.
+    later: Desk<IN, OUT>,
+    /// Where those of each cell begin.
+    begins: Vec<usize>,
+    /// The sums of the own particles, `OUT` of each: not in the buffer, as a vector cannot be read soon
+    /// after one of its numbers was written.
+    sums: [Vec<f32>; OUT],
+    /// Samples of walls about a cell.
+    walls: [Vec<Sixteen>; 4],
+}
+
+impl<const IN: usize, const OUT: usize> Place<IN, OUT> {
+    fn new() -> Self {
+        Self {
+            own: Desk::new(),
+            later: Desk::new(),
+            begins: vec![],
+            sums: std::array::from_fn(|_| vec![]),
+            walls: std::array::from_fn(|_| vec![]),
         }
     }
 
@@ -141,11 +168,18 @@ impl Neighbors<'_> {
         mut sums: [&mut [f32]; OUT],
     ) {
         sums.iter_mut().for_each(|row| row.par_chunks_mut(1 << 14).for_each(|part| part.fill(0.0)));
+        let sums_are_few = self.starts[self.lattice.cells()] < FEW;
         for odd in 0..2 {
             let tasks = self.tasks(odd, &mut sums);
-            tasks.into_par_iter().with_max_len(1).for_each_init(Desk::new, |desk, mut task| {
-                dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, desk));
-            });
+            let work = |at: &mut Place<IN, OUT>, mut task: Task<'_, OUT>| {
+                dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, at));
+            };
+            if sums_are_few {
+                let mut at = Place::new();
+                tasks.into_iter().for_each(|task| work(&mut at, task));
+            } else {
+                tasks.into_iter().par_bridge().for_each_init(Place::new, work);
+            }
         }
     }
 
@@ -186,55 +220,39 @@ fn plane<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     all: &Neighbors<'_>,
     (pair, inputs): (P, &[&[f32]; IN]),
     task: &mut Task<'_, OUT>,
-    desk: &mut Desk<IN, OUT>,
+    at: &mut Place<IN, OUT>,
 ) {
     let lattice = all.lattice;
     let begin = task.plane * lattice.plane;
-    for cell in begin..begin + lattice.plane {
-        let (first, end) = (all.starts[cell] as usize, all.starts[cell + 1] as usize);
+    // Not the rim.
+    for row in (begin + lattice.row..begin + lattice.plane - lattice.row).step_by(lattice.row) {
+        let (first, end) = (all.starts[row] as usize, all.starts[row + lattice.row] as usize);
         if first == end {
             continue;
         }
-        let runs = runs(lattice, all.starts, cell);
-        let total: usize = runs.iter().map(|(from, to)| to - from).sum();
-        desk.reserve(total);
-        let view = View::new(simd, all, first);
-        load(view, all, (pair, inputs), (&runs, total), desk);
-        let walls = if all.walls.near(cell) { load_walls(view, all, cell, desk) } else { 0 };
-        let own = end - first;
-        desk.own.iter_mut().for_each(|row| row.resize(own, 0.0));
-        // Several at a time read and write the buffer once.
-        let mut k = 0;
-        while P::FOUR && k + 4 <= own {
-            some::<_, _, 4, _, _>(simd, pair, (k, total, walls), desk);
-            k += 4;
+        let view = View::new(simd, all, (first + end) / 2);
+        load(view, all, (pair, inputs), row, at);
+        for x in 1..lattice.row - 1 {
+            let cell = row + x;
+            let own = (all.starts[cell] as usize - first, all.starts[cell + 1] as usize - first);
+            if own.0 < own.1 {
+                let walls = if all.walls.near(cell) { load_walls(view, all, cell, at) } else { 0 };
+                let next = all.starts[cell + 2] as usize - first;
+                cell_of(simd, pair, (own, next), (x, walls), at);
+            }
         }
-        while k + 2 <= own {
-            some::<_, _, 2, _, _>(simd, pair, (k, total, walls), desk);
-            k += 2;
-        }
-        if k < own {
-            some::<_, _, 1, _, _>(simd, pair, (k, total, walls), desk);
-        }
-        store(simd, (&runs, task.first), desk, &mut task.sums);
+        store(simd, all, (row, task.first), at, &mut task.sums);
     }
 }
 
-/// The runs of the cell order that a cell meets: itself and those after it.
+/// The rows that come after the one that begins with cell `row`.
 #[inline(always)]
-fn runs(lattice: &Lattice, starts: &[u32], cell: usize) -> [(usize, usize); 5] {
-    let three = |middle: usize| (starts[middle - 1] as usize, starts[middle + 2] as usize);
-    let next = cell + lattice.plane;
-    [
-        (starts[cell] as usize, starts[cell + 2] as usize),
-        three(cell + lattice.row),
-        three(next - lattice.row),
-        three(next),
-        three(next + lattice.row),
-    ]
+fn later_rows(lattice: &Lattice, row: usize) -> [usize; 4] {
+    let next = row + lattice.plane;
+    [row + lattice.row, next - lattice.row, next, next + lattice.row]
 }
 
-/// From where the particles of a cell and those about it are seen, and in which unit.
+/// From where particles are seen, and in which unit.
 #[derive(Clone, Copy)]
 struct View<S: Simd> {
     simd: S,
@@ -244,10 +262,10 @@ struct View<S: Simd> {
 
 impl<S: Simd> View<S> {
     #[inline(always)]
-    fn new(simd: S, all: &Neighbors<'_>, first: usize) -> Self {
+    fn new(simd: S, all: &Neighbors<'_>, at: usize) -> Self {
         let mut origin = [f32x16::splat(simd, 0.0); 3];
         for axis in 0..3 {
-            origin[axis] = f32x16::splat(simd, all.positions[axis][first]);
+            origin[axis] = f32x16::splat(simd, all.positions[axis][at]);
         }
         Self { simd, origin, per_length: f32x16::splat(simd, 1.0 / all.support) }
     }
@@ -268,40 +286,78 @@ impl<S: Simd> View<S> {
             (f32x16::from_slice(self.simd, from) * unit).store_slice(to);
         }
     }
+
+    /// Adds particles `from..end` to the desk.
+    #[inline(always)]
+    fn put<P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+        self,
+        all: &Neighbors<'_>,
+        (pair, inputs): (P, &[&[f32]; IN]),
+        (from, end): (usize, usize),
+        desk: &mut Desk<IN, OUT>,
+    ) {
+        let wide = (end - from).next_multiple_of(LANES);
+        let (run, to) = (from..from + wide, desk.count..desk.count + wide);
+        for axis in 0..3 {
+            let to = &mut bytemuck::cast_slice_mut(&mut desk.positions[axis])[to.clone()];
+            self.coordinates(axis, &all.positions[axis][run.clone()], to);
+        }
+        for n in 0..IN {
+            let to = &mut bytemuck::cast_slice_mut(&mut desk.inputs[n])[to.clone()];
+            self.numbers(pair.units()[n], &inputs[n][run.clone()], to);
+        }
+        desk.count += end - from;
+    }
+
+    /// Ends the desk by what is out of reach, and clears its sums.
+    #[inline(always)]
+    fn finish<const IN: usize, const OUT: usize>(self, desk: &mut Desk<IN, OUT>) {
+        let vectors = desk.count.div_ceil(LANES);
+        bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.positions[0])
+            [desk.count..vectors * LANES]
+            .fill(FAR);
+        let zero = f32x16::splat(self.simd, 0.0);
+        for o in 0..OUT {
+            for v in &mut desk.sums[o][..vectors] {
+                zero.store_slice(&mut v.0);
+            }
+        }
+    }
 }
 
-/// Copies the runs into the buffer, and clears its sums.
+/// Copies all that a row of cells works with.
 #[inline(always)]
 fn load<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     view: View<S>,
     all: &Neighbors<'_>,
-    (pair, inputs): (P, &[&[f32]; IN]),
-    (runs, total): (&[(usize, usize); 5], usize),
-    desk: &mut Desk<IN, OUT>,
+    work: (P, &[&[f32]; IN]),
+    row: usize,
+    at: &mut Place<IN, OUT>,
 ) {
-    let mut at = 0;
-    for (from, end) in runs {
-        let wide = (end - from).next_multiple_of(LANES);
-        let (run, to) = (*from..from + wide, at..at + wide);
-        for axis in 0..3 {
-            let to = &mut bytemuck::cast_slice_mut(&mut desk.positions[axis])[to.clone()];
-            view.coordinates(axis, &all.positions[axis][run.clone()], to);
+    let (lattice, starts) = (all.lattice, all.starts);
+    let run = |from: usize, end: usize| (starts[from] as usize, starts[end] as usize);
+    let own = run(row, row + lattice.row);
+    at.own.clear(own.1 - own.0);
+    view.put(all, work, own, &mut at.own);
+    view.finish(&mut at.own);
+    at.sums.iter_mut().for_each(|sums| sums.resize(own.1 - own.0, 0.0));
+
+    let rows = later_rows(lattice, row);
+    let most = rows.map(|row| run(row, row + lattice.row)).iter().map(|(a, b)| b - a).sum();
+    at.later.clear(most);
+    at.begins.clear();
+    for x in 0..lattice.row {
+        at.begins.push(at.later.count);
+        // Only what a particle meets.
+        let (from, end) = run(row + x.max(1) - 1, row + (x + 2).min(lattice.row));
+        if from < end {
+            for row in rows {
+                view.put(all, work, run(row + x, row + x + 1), &mut at.later);
+            }
         }
-        for n in 0..IN {
-            let to = &mut bytemuck::cast_slice_mut(&mut desk.inputs[n])[to.clone()];
-            view.numbers(pair.units()[n], &inputs[n][run.clone()], to);
-        }
-        at += end - from;
     }
-    let vectors = total.div_ceil(LANES);
-    bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.positions[0])[total..vectors * LANES]
-        .fill(FAR);
-    let zero = f32x16::splat(view.simd, 0.0);
-    for o in 0..OUT {
-        for v in &mut desk.sums[o][..vectors] {
-            zero.store_slice(&mut v.0);
-        }
-    }
+    at.begins.push(at.later.count);
+    view.finish(&mut at.later);
 }
 
 /// Copies the samples of walls about `cell`; how many there are.
@@ -310,7 +366,7 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
     view: View<S>,
     all: &Neighbors<'_>,
     cell: usize,
-    desk: &mut Desk<IN, OUT>,
+    at: &mut Place<IN, OUT>,
 ) -> usize {
     let (lattice, walls) = (all.lattice, all.walls);
     let mut runs = [(0, 0); 9];
@@ -321,12 +377,12 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
         *run = (walls.starts[middle - 1] as usize, walls.starts[middle + 2] as usize);
         total += run.1 - run.0;
     }
-    desk.reserve_walls(total);
-    let mut at = 0;
+    at.reserve_walls(total);
+    let mut put = 0;
     for (from, end) in runs {
         let wide = (end - from).next_multiple_of(LANES);
         for k in 0..4 {
-            let to = &mut bytemuck::cast_slice_mut(&mut desk.walls[k])[at..at + wide];
+            let to = &mut bytemuck::cast_slice_mut(&mut at.walls[k])[put..put + wide];
             let from = &walls.rows[k][from..from + wide];
             if k < 3 {
                 view.coordinates(k, from, to);
@@ -334,39 +390,125 @@ fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
                 view.numbers(1.0, from, to);
             }
         }
-        at += end - from;
+        put += end - from;
     }
     let end = total.next_multiple_of(LANES);
-    bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.walls[0])[total..end].fill(FAR);
+    bytemuck::cast_slice_mut::<Sixteen, f32>(&mut at.walls[0])[total..end].fill(FAR);
     total
 }
 
-/// The sums of the `M` particles of the cell from `k` on, a divisor of [`LANES`]; their partners' go to
-/// the buffer.
+/// Lets the particles `own` of the row meet those up to `next` and those of the rows after it; several at a
+/// time, so that the buffers are read and written once for all of them.
+#[inline(always)]
+fn cell_of<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+    simd: S,
+    pair: P,
+    ((begin, end), next): ((usize, usize), usize),
+    (x, walls): (usize, usize),
+    at: &mut Place<IN, OUT>,
+) {
+    let mut k = begin;
+    while P::FOUR && k + 4 <= end {
+        some::<_, _, 4, _, _>(simd, pair, (k, next), (x, walls), at);
+        k += 4;
+    }
+    while k + 2 <= end {
+        some::<_, _, 2, _, _>(simd, pair, (k, next), (x, walls), at);
+        k += 2;
+    }
+    if k < end {
+        some::<_, _, 1, _, _>(simd, pair, (k, next), (x, walls), at);
+    }
+}
+
+/// The sums of the `M` particles of the row from `k` on.
 #[inline(always)]
 fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: usize>(
     simd: S,
     pair: P,
-    (k, total, wall_count): (usize, usize, usize),
-    desk: &mut Desk<IN, OUT>,
+    (k, next): (usize, usize),
+    (x, wall_count): (usize, usize),
+    at: &mut Place<IN, OUT>,
 ) {
     let zero = f32x16::splat(simd, 0.0);
-    let (vector, lane) = (k / LANES, k % LANES);
-    let (mut place, mut i) = ([[zero; 3]; M], [[zero; IN]; M]);
-    // Each particle itself and those before it have been met.
-    let mut met = [mask32x16::from_bitmask(simd, 0); M];
+    let mut these = These { place: [[zero; 3]; M], i: [[zero; IN]; M], sums: [[zero; OUT]; M] };
     for m in 0..M {
-        place[m] = of_buffer(simd, &desk.positions, (vector, lane + m));
-        i[m] = of_buffer(simd, &desk.inputs, (vector, lane + m));
-        met[m] = mask32x16::from_bitmask(simd, (2u64 << (lane + m)) - 1);
+        these.place[m] = of_buffer(simd, &at.own.positions, k + m);
+        these.i[m] = of_buffer(simd, &at.own.inputs, k + m);
     }
-    let mut sums = [[zero; OUT]; M];
+    // Each particle itself and those before it have been met.
+    let met = k % LANES;
+    meet::<_, _, true, M, _, _>(simd, pair, (k / LANES, next, met), &mut at.own, &mut these);
+    let later = (at.begins[x - 1] / LANES, at.begins[x + 2], 0);
+    meet::<_, _, false, M, _, _>(simd, pair, later, &mut at.later, &mut these);
+    for m in 0..M {
+        if wall_count > 0 {
+            let (place, i) = (these.place[m], these.i[m]);
+            at_walls(simd, pair, (place, i, wall_count), &at.walls, &mut these.sums[m]);
+        }
+    }
+    // Eight vectors are added up at a time.
+    for first in (0..M * OUT).step_by(8) {
+        let mut eight = [zero; 8];
+        for n in first..(M * OUT).min(first + 8) {
+            eight[n - first] = these.sums[n / OUT][n % OUT];
+        }
+        let sums = add_up(eight);
+        for n in first..(M * OUT).min(first + 8) {
+            at.sums[n % OUT][k + n / OUT] = sums[n - first];
+        }
+    }
+}
+
+/// The sums of the numbers of each of eight vectors.
+#[inline(always)]
+fn add_up<S: Simd>(v: [f32x16<S>; 8]) -> [f32; 8] {
+    let twos = [halves(v[0], v[4]), halves(v[2], v[6]), halves(v[1], v[5]), halves(v[3], v[7])];
+    let sum = halves(halves(twos[0], twos[1]), halves(twos[2], twos[3]));
+    let (low, high) = sum.split();
+    let mut sums = [0.0; 8];
+    (low + high).store_slice(&mut sums);
+    sums
+}
+
+/// Half of each vector added to its other half, in turns.
+#[inline(always)]
+fn halves<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    a.zip_low(b) + a.zip_high(b)
+}
+
+/// Particles at work, each sixteen times.
+struct These<S: Simd, const M: usize, const IN: usize, const OUT: usize> {
+    place: [[f32x16<S>; 3]; M],
+    i: [[f32x16<S>; IN]; M],
+    sums: [[f32x16<S>; OUT]; M],
+}
+
+/// Lets particles meet those of the desk from vector `begin` up to particle `end`; the first `met` and, one more
+/// for each, the particles themselves not, where `MASKED`.
+#[inline(always)]
+fn meet<
+    S: Simd,
+    P: Pair<IN, OUT>,
+    const MASKED: bool,
+    const M: usize,
+    const IN: usize,
+    const OUT: usize,
+>(
+    simd: S,
+    pair: P,
+    (begin, end, met): (usize, usize, usize),
+    desk: &mut Desk<IN, OUT>,
+    these: &mut These<S, M, IN, OUT>,
+) {
+    let zero = f32x16::splat(simd, 0.0);
     // All of one length, so that no index needs a test.
-    let rest = vector..total.div_ceil(LANES);
-    let [x, y, z] = desk.positions.each_ref().map(|row| &row[rest.clone()]);
-    let inputs = desk.inputs.each_ref().map(|row| &row[rest.clone()]);
-    let outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
-    for v in 0..rest.len() {
+    let part = begin..end.div_ceil(LANES).max(begin);
+    let positions = desk.positions.each_ref().map(|row| &row[part.clone()]);
+    let inputs = desk.inputs.each_ref().map(|row| &row[part.clone()]);
+    let outputs = desk.sums.each_mut().map(|row| &mut row[part.clone()]);
+    let mut sums = these.sums;
+    for v in 0..part.len() {
         let (mut j, mut theirs) = ([zero; IN], [zero; OUT]);
         for n in 0..IN {
             j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
@@ -375,11 +517,12 @@ fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: u
             theirs[o] = f32x16::from_slice(simd, &outputs[o][v].0);
         }
         for m in 0..M {
-            let mut at = apart(simd, place[m], [x, y, z], v);
-            if v == 0 {
-                at.w = met[m].select(zero, at.w);
+            let mut at = apart(simd, these.place[m], positions, v);
+            if MASKED && v < 2 {
+                let met = ((2u64 << (met + m)) - 1) >> (v * LANES);
+                at.w = mask32x16::from_bitmask(simd, met & 0xffff).select(zero, at.w);
             }
-            let (t, found) = pair.pair(at, i[m], j);
+            let (t, found) = pair.pair(at, these.i[m], j);
             for o in 0..OUT {
                 if P::SIGN[o] != 0.0 {
                     let t_theirs = if P::SIGN[o] < 0.0 { -t } else { t };
@@ -394,14 +537,7 @@ fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: u
             }
         }
     }
-    for m in 0..M {
-        if wall_count > 0 {
-            at_walls(simd, pair, (place[m], i[m], wall_count), desk, &mut sums[m]);
-        }
-        for o in 0..OUT {
-            desk.own[o][k + m] = sums[m][o].reduce_sum();
-        }
-    }
+    these.sums = sums;
 }
 
 /// Adds up over samples of walls.
@@ -410,11 +546,11 @@ fn at_walls<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     simd: S,
     pair: P,
     (place, i, total): ([f32x16<S>; 3], [f32x16<S>; IN], usize),
-    desk: &Desk<IN, OUT>,
+    walls: &[Vec<Sixteen>; 4],
     sums: &mut [f32x16<S>; OUT],
 ) {
     let vectors = total.div_ceil(LANES);
-    let [x, y, z, weights] = desk.walls.each_ref().map(|row| &row[..vectors]);
+    let [x, y, z, weights] = walls.each_ref().map(|row| &row[..vectors]);
     for v in 0..vectors {
         let at = apart(simd, place, [x, y, z], v);
         let (t, found) = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
@@ -429,11 +565,11 @@ fn at_walls<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
 fn of_buffer<S: Simd, const N: usize>(
     simd: S,
     rows: &[Vec<Sixteen>; N],
-    (vector, lane): (usize, usize),
+    k: usize,
 ) -> [f32x16<S>; N] {
     let mut numbers = [f32x16::splat(simd, 0.0); N];
     for n in 0..N {
-        numbers[n] = f32x16::splat(simd, rows[n][vector].0[lane]);
+        numbers[n] = f32x16::splat(simd, rows[n][k / LANES].0[k % LANES]);
     }
     numbers
 }
@@ -450,28 +586,37 @@ fn apart<S: Simd>(simd: S, place: [f32x16<S>; 3], rows: [&[Sixteen]; 3], v: usiz
     Apart { d, w: w.max(f32x16::splat(simd, 0.0)) }
 }
 
-/// Brings the sums of the buffer back to their particles.
+/// Brings the sums of the buffers back to their particles; those of the slices begin with `first`.
 #[inline(always)]
 fn store<S: Simd, const IN: usize, const OUT: usize>(
     simd: S,
-    (runs, first): (&[(usize, usize); 5], usize),
-    desk: &Desk<IN, OUT>,
+    all: &Neighbors<'_>,
+    (row, first): (usize, usize),
+    at: &Place<IN, OUT>,
     sums: &mut [&mut [f32]; OUT],
 ) {
+    let (lattice, starts) = (all.lattice, all.starts);
+    let place = |cell: usize| starts[cell] as usize - first;
+    let own = place(row);
     for o in 0..OUT {
-        let own = runs[0].0 - first;
-        for (to, sum) in sums[o][own..].iter_mut().zip(&desk.own[o]) {
-            *to += sum;
-        }
+        add(simd, &at.sums[o], &mut sums[o][own..], at.sums[o].len());
+        let partners = bytemuck::cast_slice(&at.own.sums[o]);
+        add(simd, partners, &mut sums[o][own..], at.own.count);
     }
-    let mut at = 0;
-    for (begin, end) in runs {
-        let (begin, length) = (begin - first, end - begin);
-        for o in 0..OUT {
-            let from: &[f32] = bytemuck::cast_slice(&desk.sums[o]);
-            add(simd, &from[at..], &mut sums[o][begin..], length);
+    let rows = later_rows(lattice, row);
+    for (x, begins) in at.begins.windows(2).enumerate() {
+        let mut from = begins[0];
+        if from == begins[1] {
+            continue;
         }
-        at += length;
+        for row in rows {
+            let (begin, end) = (place(row + x), place(row + x + 1));
+            for o in 0..OUT {
+                let partners: &[f32] = bytemuck::cast_slice(&at.later.sums[o]);
+                add(simd, &partners[from..], &mut sums[o][begin..], end - begin);
+            }
+            from += end - begin;
+        }
     }
 }
 
@@ -482,7 +627,7 @@ fn add<S: Simd>(simd: S, from: &[f32], to: &mut [f32], length: usize) {
     while at < length {
         let left = length - at;
         let (from, to) = (&from[at..], &mut to[at..]);
-        if to.len() >= LANES {
+        if to.len() >= LANES && from.len() >= LANES {
             let mut sum = f32x16::from_slice(simd, &from[..LANES]);
             if left < LANES {
                 let inside = mask32x16::from_bitmask(simd, (1u64 << left) - 1);
@@ -490,6 +635,7 @@ fn add<S: Simd>(simd: S, from: &[f32], to: &mut [f32], length: usize) {
             }
             (f32x16::from_slice(simd, &to[..LANES]) + sum).store_slice(&mut to[..LANES]);
         } else {
+            let left = left.min(LANES);
             to[..left].iter_mut().zip(from).for_each(|(to, from)| *to += from);
         }
         at += LANES;

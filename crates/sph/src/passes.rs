@@ -85,10 +85,13 @@ impl Pair<0, 8> for Factors {
     }
 }
 
-/// The force of pressure and viscosity on a particle, over m C: Σ t [(P_i + P_j) d − ν (v_i − v_j)].
+/// The force of pressure, viscosity and cohesion on a particle, over m C:
+/// Σ t [(P_i + P_j − k w) d − ν (v_i − v_j)].
 ///
 /// Numbers: P = p/ρ², and the velocity. Viscosity is the Laplacian of Brookshaw 1985, for this kernel
 /// without a division: 2ν m/ρ Σ (v_i − v_j) (d·∇W)/r² = −2ν m/(ρ h) C Σ t (v_i − v_j).
+///
+/// Cohesion is that of Becker & Teschner 2007, Eq. 14: −κ Σ W d; it keeps momentum, and is none between liquid and wall.
 ///
 /// The pressure in a wall is that of liquid at rest which goes on behind it, P_b = P_i − g·d/ρ₀ (as in Adami et
 /// al. 2012), though no further from P_i than P_i itself: none where liquid falls freely along it.
@@ -97,6 +100,8 @@ impl Pair<0, 8> for Factors {
 pub(crate) struct Force {
     /// 2ν/(ρ h).
     pub viscosity: f32,
+    /// k.
+    pub cohesion: f32,
     /// g h/ρ₀.
     pub gravity: [f32; 3],
 }
@@ -120,7 +125,7 @@ impl Pair<4, 3> for Force {
 
     #[inline(always)]
     fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], j: [f32x16<S>; 4]) -> Found<S, 3> {
-        let push = i[0] + j[0];
+        let push = at.w.mul_add(f32x16::splat(at.w.token(), -self.cohesion), i[0] + j[0]);
         let [x, y, z] = at.d;
         let [u, v, w] = [i[1] - j[1], i[2] - j[2], i[3] - j[3]];
         (fourth(at.w), [push.mul_sub(x, u), push.mul_sub(y, v), push.mul_sub(z, w)])
@@ -132,7 +137,7 @@ impl Pair<4, 3> for Force {
     }
 }
 
-/// [`Force`] but for pressures P_i and P_j: viscosity, and P_b − P_i of walls ([`crate::dfsph`]).
+/// [`Force`] but for pressures P_i and P_j: viscosity, cohesion, and P_b − P_i of walls ([`crate::dfsph`]).
 #[derive(Clone, Copy)]
 pub(crate) struct Drag(pub Force);
 
@@ -145,7 +150,10 @@ impl Pair<4, 3> for Drag {
 
     #[inline(always)]
     fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; 4], j: [f32x16<S>; 4]) -> Found<S, 3> {
-        (fourth(at.w), [j[1] - i[1], j[2] - i[2], j[3] - i[3]])
+        let pull = at.w * -self.0.cohesion;
+        let [x, y, z] = at.d;
+        let [u, v, w] = [i[1] - j[1], i[2] - j[2], i[3] - j[3]];
+        (fourth(at.w), [pull.mul_sub(x, u), pull.mul_sub(y, v), pull.mul_sub(z, w)])
     }
 
     #[inline(always)]

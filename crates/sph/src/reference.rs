@@ -11,7 +11,7 @@ use crate::random::{points, uniform};
 use crate::walls::{Solid, Walls};
 
 const SUPPORT: f32 = 0.11;
-const FORCE: Force = Force { viscosity: 0.02, gravity: [0.5, -0.1, -2.0] };
+const FORCE: Force = Force { viscosity: 0.02, cohesion: 0.3, gravity: [0.5, -0.1, -2.0] };
 
 /// Particles in a box with walls, in cell order, with four numbers each.
 struct Case {
@@ -29,7 +29,7 @@ impl Case {
         let mut rows = points(count, size);
         let lattice = Lattice::new([-0.05; 3], size.map(|v| v + 0.05), SUPPORT);
         let mut order = Order::default();
-        order.sort(&lattice, [&rows[0], &rows[1], &rows[2]], count);
+        order.sort(Level::new(), &lattice, [&rows[0], &rows[1], &rows[2]], count);
         for row in &mut rows {
             let mut sorted: Vec<f32> = order.from.iter().map(|i| row[*i as usize]).collect();
             sorted.resize(padded(count), 0.0);
@@ -159,7 +159,7 @@ fn forces_are_sums_over_all_pairs() {
             let t = w.powi(4);
             [0, 1, 2].map(|a| {
                 let drag = f64::from(0.02f32) * (i[a + 1] - j[a + 1]);
-                t * ((i[0] + j[0]) * d[a] - drag)
+                t * ((i[0] + j[0] - f64::from(0.3f32) * w) * d[a] - drag)
             })
         },
         |d, w, i, weight| {

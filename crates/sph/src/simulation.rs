@@ -1,8 +1,9 @@
 //! A simulation: from frame to frame, in steps as large as the solver allows.
 //!
 //! Time steps (Monaghan 1992, §10.3; lengths in spacings Δ, λ the `cfl`): Δt ≤ λ Δ / v_max, v_max + c for
-//! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν). What is left of a frame is
-//! divided evenly.
+//! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν);
+//! Δt ≤ λ √(ρ Δ³ / γ), so that the shortest waves of the surface are seen (Brackbill et al. 1992). What is left of a
+//! frame is divided evenly.
 
 use fearless_simd::Level;
 use motes_scene::{Solver, Sph};
@@ -13,7 +14,7 @@ use crate::fluid::{CHUNK, Fluid, total};
 use crate::kernel::Kernel;
 use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
-use crate::passes::DensityAndMask;
+use crate::passes::{Density, DensityAndMask};
 use crate::scenario::Setup;
 use crate::virial::transmitted;
 use crate::walls::Walls;
@@ -243,11 +244,14 @@ impl Simulation {
     /// The simulation has blown up, in words.
     pub fn step(&mut self, secs: f64) -> Result<(), String> {
         self.pour(secs);
-        self.fluid.sort(&self.lattice);
-        self.greatest = match self.physics.sph.solver {
-            Solver::Wcsph => self.weakly_compressible(secs as f32),
-            Solver::Dfsph => self.divergence_free(secs as f32),
-        };
+        // In one visit to the threads, not one for each loop.
+        rayon::scope(|_| {
+            self.fluid.sort(&self.lattice, &self.physics);
+            self.greatest = match self.physics.sph.solver {
+                Solver::Wcsph => self.weakly_compressible(secs as f32),
+                Solver::Dfsph => self.divergence_free(secs as f32),
+            };
+        });
         self.stats.time += secs;
         self.stats.steps += 1;
         self.stats.step_secs = secs;
@@ -277,6 +281,7 @@ impl Simulation {
         (sph.cfl * spacing / speed)
             .min(0.25 * sph.cfl * (spacing / acceleration).sqrt())
             .min(spacing * spacing / (4.0 * f64::from(*viscosity)))
+            .min(sph.cfl * (sph.density * spacing.powi(3) / sph.surface_tension).sqrt())
             .min(LONGEST_STEP)
     }
 
@@ -355,14 +360,33 @@ impl Simulation {
         greatest
     }
 
-    /// The frame as it stands.
-    pub fn frame(&mut self) -> Frame {
-        self.fluid.sort(&self.lattice);
-        let (around, fluid, physics, stats) = self.parts();
+    /// Finds neighbours and densities, as a step of wcsph does.
+    pub fn find_densities(&mut self) {
+        self.fluid.sort(&self.lattice, &self.physics);
+        let (around, fluid, physics, _) = self.parts();
+        let n = fluid.count;
+        let mut sums = std::mem::take(&mut fluid.sums);
+        around.of(fluid, physics).sum(Density, [], [&mut sums[0][..n]]);
+        fluid.sums = sums;
+    }
+
+    /// Finds neighbours, densities and masks, as [`Simulation::frame`] does.
+    pub fn find_masks(&mut self) {
+        self.fluid.sort(&self.lattice, &self.physics);
+        let (around, fluid, physics, _) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
         let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
         around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
+        fluid.sums = sums;
+    }
+
+    /// The frame as it stands.
+    pub fn frame(&mut self) -> Frame {
+        self.find_masks();
+        let (around, fluid, physics, stats) = self.parts();
+        let n = fluid.count;
+        let mut sums = std::mem::take(&mut fluid.sums);
         let (density, pressure) = (&sums[0][..n], &mut fluid.pressure);
         let scale = physics.mass * physics.kernel.value;
         for (at, pressure) in pressure[..n].iter_mut().enumerate() {

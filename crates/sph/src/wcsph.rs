@@ -11,6 +11,10 @@ use crate::fluid::CHUNK;
 use crate::passes::{Density, Force};
 use crate::simulation::{Greatest, Physics};
 
+/// What a cohesion κ makes of a surface, γ = ρ² κ h³/m · 9009/(8 · 1024 · 336): the work of parting the two halves of a liquid,
+/// π/8 n² ∫ r⁴ F dr with F = m κ r W and n = ρ/m (Fowler 1937). In units of k = κ h²/(10 m), γ = FOWLER · ρ² h k.
+const FOWLER: f32 = 90_090.0 / (8.0 * 1024.0 * 336.0);
+
 impl Physics {
     /// The pressure of the equation of state, pascals.
     pub(crate) fn pressure(&self, density: f32) -> f32 {
@@ -30,7 +34,9 @@ impl Physics {
         let support = self.kernel.support;
         let viscosity = 2.0 * self.viscosity / (self.density * support);
         let gravity = self.gravity.map(|g| g * support / self.density);
-        (Force { viscosity, gravity }, self.mass * self.kernel.slope)
+        let tension = self.sph.surface_tension as f32;
+        let cohesion = tension / (FOWLER * self.density * self.density * support);
+        (Force { viscosity, cohesion, gravity }, self.mass * self.kernel.slope)
     }
 }
 

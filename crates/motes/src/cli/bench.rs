@@ -18,7 +18,8 @@ Examples:
   motes bench spheres --source demo:dam:1e6 --peer-view --json
   motes bench surface --scale 0.1 --stages table2,fig8   liquids: the paper's views, on smaller sets
   motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json
-  motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64";
+  motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64
+  motes bench density --stages endure                    ten seconds of 10⁵ particles: an hour";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
