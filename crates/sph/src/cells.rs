@@ -76,6 +76,7 @@ impl Lattice {
 }
 
 /// The cells of points, as [`Lattice::cell`] has them.
+#[allow(clippy::needless_range_loop)] // iterators leave the instruction set of a kernel
 #[simd]
 fn cells<S: Simd>(simd: S, lattice: &Lattice, points: [&[f32]; 3], keys: &mut [u32]) {
     let whole = keys.len() / 16 * 16;
@@ -109,13 +110,7 @@ pub(crate) struct Order {
 
 impl Order {
     /// Sorts `count` particles at `positions` (longer, perhaps).
-    pub fn sort(
-        &mut self,
-        level: Level,
-        lattice: &Lattice,
-        positions: [&[f32]; 3],
-        count: usize,
-    ) {
+    pub fn sort(&mut self, level: Level, lattice: &Lattice, positions: [&[f32]; 3], count: usize) {
         self.keys.resize(count, 0);
         self.by_plane.resize(count, 0);
         self.from.resize(count, 0);

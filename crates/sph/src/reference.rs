@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 
 use crate::cells::{Lattice, Order};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, Kind, Smooth, Wendland};
 use crate::mask::from_sums;
 use crate::pairs::{Neighbors, Pair, padded};
 use crate::passes::{Density, DensityAndMask, Divergence, Factors, Force, Push};
@@ -11,7 +11,8 @@ use crate::random::{points, uniform};
 use crate::walls::{Solid, Walls};
 
 const SUPPORT: f32 = 0.11;
-const FORCE: Force = Force { viscosity: 0.02, cohesion: 0.3, gravity: [0.5, -0.1, -2.0] };
+const FORCE: Force<Smooth> =
+    Force { kernel: Smooth, viscosity: 0.02, cohesion: 0.3, gravity: [0.5, -0.1, -2.0] };
 
 /// Particles in a box with walls, in cell order, with four numbers each.
 struct Case {
@@ -36,7 +37,12 @@ impl Case {
             *row = sorted;
         }
         let solids = [Solid::Box([0.0; 3], size), Solid::Ball([0.4, 0.25, 0.2], 0.1)];
-        let walls = Walls::new((&solids, 0.5), 0.5 * SUPPORT, &Kernel::new(SUPPORT), &lattice);
+        let walls = Walls::new(
+            (&solids, 0.5),
+            0.5 * SUPPORT,
+            &Kernel::new(Kind::Smooth, SUPPORT),
+            &lattice,
+        );
         let inputs = std::array::from_fn(|k| {
             (0..padded(count)).map(|i| uniform(9 + k as u64, i as u64) - 0.4).collect()
         });
@@ -118,7 +124,14 @@ fn passes_are_sums_over_all_pairs() {
     let level = Level::new();
     let slow = case.slow(|_, w, _, _| [shape(w)], |_, w, _, weight| [shape(w) * weight]);
     assert!(slow.iter().any(|s| s[0] > 1.0));
-    assert_near(&case.fast(Density, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Density(Smooth), level), &slow, TOLERANCE);
+    let wendland = |w: f64| {
+        let d = (1.0 - w).sqrt();
+        [(1.0 - d).powi(3), (1.0 - d) * (1.0 + 4.0 * d)]
+    };
+    let value = |w: f64| wendland(w)[0] * wendland(w)[1];
+    let slow = case.slow(|_, w, _, _| [value(w)], |_, w, _, weight| [value(w) * weight]);
+    assert_near(&case.fast(Density(Wendland), level), &slow, TOLERANCE);
 
     let factors = |d: [f64; 3], w: f64, weight: f64| {
         let t = w.powi(4) * weight;
@@ -134,20 +147,20 @@ fn passes_are_sums_over_all_pairs() {
             [a, b, c, e, b, c, e, 0.0]
         },
     );
-    assert_near(&case.fast(Factors, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Factors(Smooth), level), &slow, TOLERANCE);
 
     let along = |d: [f64; 3], v: [f64; 3]| (0..3).map(|a| d[a] * v[a]).sum::<f64>();
     let slow = case.slow(
         |d, w, i, j| [w.powi(4) * along(d, [0, 1, 2].map(|a| i[a] - j[a]))],
         |d, w, i, weight| [w.powi(4) * weight * along(d, [i[0], i[1], i[2]])],
     );
-    assert_near(&case.fast(Divergence, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Divergence(Smooth), level), &slow, TOLERANCE);
 
     let slow = case.slow(
         |d, w, i, j| d.map(|d| w.powi(4) * (i[0] + j[0]) * d),
         |d, w, i, weight| d.map(|d| 2.0 * w.powi(4) * weight * i[0] * d),
     );
-    assert_near(&case.fast(Push, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Push(Smooth), level), &slow, TOLERANCE);
 }
 
 #[test]

@@ -2,8 +2,10 @@
 //!
 //! Time steps (Monaghan 1992, §10.3; lengths in spacings Δ, λ the `cfl`): Δt ≤ λ Δ / v_max, v_max + c for
 //! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν);
-//! Δt ≤ λ √(ρ Δ³ / γ), so that the shortest waves of the surface are seen (Brackbill et al. 1992). What is left of a
+//! Δt ≤ λ √(ρ Δ³ / (4π γ)), so that the shortest waves of the surface are seen (Brackbill et al. 1992). What is left of a
 //! frame is divided evenly.
+
+use std::f64::consts::PI;
 
 use fearless_simd::Level;
 use motes_scene::{Solver, Sph};
@@ -11,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::cells::Lattice;
 use crate::fluid::{CHUNK, Fluid, total};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, Kind, Smooth, Wendland};
 use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
 use crate::passes::{Density, DensityAndMask};
@@ -133,9 +135,16 @@ impl Greatest {
 }
 
 impl Physics {
+    /// The least and the greatest corner of where particles can be: the samples of the walls of dfsph.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        let behind = 0.5 * self.spacing;
+        [self.tank[0].map(|v| v - behind), self.tank[1].map(|v| v + behind)]
+    }
+
     fn new(setup: &Setup, sph: &Sph) -> Self {
         let spacing = f64::from(setup.spacing);
-        let kernel = Kernel::new(2.0 * setup.spacing);
+        let kind = if sph.solver == Solver::Wcsph { Kind::Smooth } else { Kind::Wendland };
+        let kernel = Kernel::new(kind, 2.0 * setup.spacing);
         // A lattice at rest has the density at rest.
         let sum = kernel.lattice_sum(spacing) * f64::from(kernel.value);
         let mass = sph.density / sum;
@@ -281,7 +290,9 @@ impl Simulation {
         (sph.cfl * spacing / speed)
             .min(0.25 * sph.cfl * (spacing / acceleration).sqrt())
             .min(spacing * spacing / (4.0 * f64::from(*viscosity)))
-            .min(sph.cfl * (sph.density * spacing.powi(3) / sph.surface_tension).sqrt())
+            .min(
+                sph.cfl * (sph.density * spacing.powi(3) / (4.0 * PI * sph.surface_tension)).sqrt(),
+            )
             .min(LONGEST_STEP)
     }
 
@@ -329,10 +340,7 @@ impl Simulation {
         let n = fluid.count;
         let mut greatest = Greatest::default();
         for axis in 0..3 {
-            // Where the samples of the walls are.
-            let behind = 0.5 * physics.spacing;
-            let [low, high] = physics.tank.map(|corner| corner[axis]);
-            let (low, high) = (low - behind, high + behind);
+            let [low, high] = physics.bounds().map(|corner| corner[axis]);
             let place = fluid.position[axis][..n].par_chunks_mut(CHUNK);
             let speed = fluid.velocity[axis][..n].par_chunks_mut(CHUNK);
             let motion = &fluid.motion[axis];
@@ -360,13 +368,17 @@ impl Simulation {
         greatest
     }
 
-    /// Finds neighbours and densities, as a step of wcsph does.
+    /// Finds neighbours and densities, without masks.
     pub fn find_densities(&mut self) {
         self.fluid.sort(&self.lattice, &self.physics);
         let (around, fluid, physics, _) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
-        around.of(fluid, physics).sum(Density, [], [&mut sums[0][..n]]);
+        let (pairs, out) = (around.of(fluid, physics), [&mut sums[0][..n]]);
+        match physics.kernel.kind {
+            Kind::Wendland => pairs.sum(Density(Wendland), [], out),
+            Kind::Smooth => pairs.sum(Density(Smooth), [], out),
+        }
         fluid.sums = sums;
     }
 
@@ -377,7 +389,11 @@ impl Simulation {
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
         let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
-        around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
+        let (pairs, out) = (around.of(fluid, physics), [a, b, c, d, e, f, g]);
+        match physics.kernel.kind {
+            Kind::Wendland => pairs.sum(DensityAndMask(Wendland), [], out),
+            Kind::Smooth => pairs.sum(DensityAndMask(Smooth), [], out),
+        }
         fluid.sums = sums;
     }
 

@@ -162,11 +162,12 @@ fn sample_ball(center: [f32; 3], radius: f32, spacing: f32) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::Kind;
 
     #[test]
     fn a_plane_weighs_as_much_as_liquid() {
         let (low, high, spacing) = ([0.0; 3], [1.0, 1.0, 1.0], 0.1);
-        let kernel = Kernel::new(0.2);
+        let kernel = Kernel::new(Kind::Wendland, 0.2);
         let lattice = Lattice::new([-0.05; 3], [1.05; 3], 0.2);
         let walls = Walls::new((&[Solid::Box(low, high)], 0.5), spacing, &kernel, &lattice);
         assert_eq!(walls.count(), 12usize.pow(3) - 10usize.pow(3));
