@@ -264,7 +264,11 @@ impl Sph {
         need("sph.cfl", cfl, (0.01..=2.0).contains(&cfl), "a number in 0.01 to 2")?;
         let density = self.density;
         need("sph.density", density, (1e-3..=1e6).contains(&density), "0.001 to 1e6 kg/m³")?;
-        let numbers = [("sph.viscosity", self.viscosity), ("sph.smoothing", self.smoothing)];
+        let numbers = [
+            ("sph.viscosity", self.viscosity),
+            ("sph.smoothing", self.smoothing),
+            ("sph.surface_tension", self.surface_tension),
+        ];
         for (path, v) in numbers {
             need(path, v, (0.0..=1e6).contains(&v), "a number in 0 to 1e6")?;
         }

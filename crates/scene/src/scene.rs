@@ -283,6 +283,8 @@ settings! {
         tolerance: f64 = 0.001,
         /// dfsph: iterations at the most, for each of its two solvers and time steps.
         iterations: u32 = 50,
+        /// Surface tension, N/m; of real use where drops are small: water has 0.072.
+        surface_tension: f64 = 0.0,
     }
 }
 
