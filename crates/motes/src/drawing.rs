@@ -8,6 +8,7 @@ use motes_frame::{Frame, Layer};
 use motes_scene::{Bounds, Renderer, Resolved, Scene};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
+use rayon::prelude::*;
 
 use crate::cut::Visible;
 use crate::density::{Cast, Fields};
@@ -161,11 +162,12 @@ impl Drawing<'_> {
 fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
     // Where nothing is, the system is 0.
     let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
+    let each = || center.par_iter().with_min_len(1 << 14);
     Ok(frame
-        .with(Layer::Depth(center.iter().map(|c| c.depth).collect()))?
-        .with(Layer::Normal(center.iter().map(|c| c.normal).collect()))?
-        .with(Layer::Id(center.iter().map(|c| c.id).collect()))?
-        .with(Layer::System(center.iter().map(system).collect()))?)
+        .with(Layer::Depth(each().map(|c| c.depth).collect()))?
+        .with(Layer::Normal(each().map(|c| c.normal).collect()))?
+        .with(Layer::Id(each().map(|c| c.id).collect()))?
+        .with(Layer::System(each().map(system).collect()))?)
 }
 
 /// The name of an instruction set.

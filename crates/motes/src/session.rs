@@ -99,6 +99,8 @@ enum After {
     /// It may be asked for again.
     Kept,
     LetGo,
+    /// It is one of many that pass by: as Kept, but what a liquid hides of lines is not found out.
+    Moves,
 }
 
 /// A scene whose sources are open.
@@ -287,12 +289,14 @@ impl Session {
         })
     }
 
-    /// A picture as it is shown, and what it is of. The hash is made only if it is asked for.
+    /// A picture as it is shown, and what it is of; of a passing one without its hash, and with lines before
+    /// what a liquid would hide of them.
     ///
     /// # Errors
     /// As [`Session::render`].
     pub(crate) fn look(&mut self, frame: usize, hashed: bool, watch: &dyn Watch) -> Result<Look> {
-        let drawn = self.draw((frame.into(), After::Kept), Layers::No, watch)?;
+        let after = if hashed { After::Kept } else { After::Moves };
+        let drawn = self.draw((frame.into(), after), Layers::No, watch)?;
         let Drawn { raw, mut stats, loaded, resolved, boxes, origin, .. } = drawn;
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
@@ -338,9 +342,9 @@ impl Session {
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth, and cues come from all layers.
-        let layers = layers == Layers::Yes
-            || scene.cue.any()
-            || loaded.iter().any(|l| l.sim_box.is_some());
+        let lines = loaded.iter().any(|l| l.sim_box.is_some());
+        let quick = after == After::Moves && self.scene.renderer != Renderer::Spheres;
+        let layers = layers == Layers::Yes || scene.cue.any() || (lines && !quick);
         let start = Instant::now();
         let drawing = Drawing {
             scene: &self.scene,
@@ -498,7 +502,7 @@ impl Session {
                 self.ranges[i] = Some((key, range));
             }
             all.push(Some(match after {
-                After::Kept => series.frame(own, &wanted, &report)?,
+                After::Kept | After::Moves => series.frame(own, &wanted, &report)?,
                 After::LetGo => Arc::new(series.take(own, &wanted, &report)?),
             }));
         }

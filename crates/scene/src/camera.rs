@@ -148,8 +148,13 @@ impl CameraView {
             height: size.1,
             lens: None,
         };
-        // A box that had to be given an extent stands for all.
-        let boxes = if whole == Some(bounds) { framing.boxes } else { &[bounds] };
+        // A box that had to be given an extent stands for all; so does any before a camera that says where it
+        // stands and how much it sees.
+        let tight = match camera.projection {
+            Projection::Perspective => camera.position.is_none(),
+            Projection::Orthographic => camera.position.is_none() || camera.height.is_none(),
+        };
+        let boxes = if tight && whole == Some(bounds) { framing.boxes } else { &[bounds] };
         let corners: Vec<DVec3> =
             boxes.iter().flat_map(Bounds::corners).map(|c| view.in_view(c)).collect();
         let free = framing.free_right.clamp(0.0, 0.4);
