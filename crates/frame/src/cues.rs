@@ -265,7 +265,6 @@ impl Amounts {
             }
         }
     }
-
 }
 
 impl Work {

@@ -16,8 +16,8 @@ use motes_grid::{Grid, Radii, Resolution, Visibility};
 use motes_particles::read::names;
 use motes_scene::{Beyond, Bounds, Environment, Lights, Resolved, Scene};
 
-use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::cut::Visible;
+use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
 use crate::scenery::{Others, Scenery};

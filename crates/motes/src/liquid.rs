@@ -11,17 +11,17 @@ use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
 use motes_grid::{Clip, Visibility};
 use motes_scene::surface::{self, Culling, Filtering};
-use motes_spheres::Cap;
 use motes_scene::{Beyond, Bounds, CameraView, Environment, Lights, Resolved, Scene};
+use motes_spheres::Cap;
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Medium, Mode, Occlusion, Optics, Paint,
     Params, Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress,
     connect, filter, normals, shade_finer, splat, voxelize,
 };
 
-use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::caps::Caps;
 use crate::cut::Visible;
+use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::memo::{Memo, Same};
 use crate::nearest::Nearest;
 use crate::paint;
@@ -193,10 +193,11 @@ impl Liquid<'_> {
         let ball = self.scene.surface.ball;
         let input = Input { particles: self.matter.particles, radius_scale: ball as f32 };
         let extract = || Ok(Boundary::extract(&input, params, self.level));
-        let boundary: std::result::Result<_, Infallible> = match (self.boundaries, self.matter.identity) {
-            (Some(kept), Some(of)) => kept.get((Same(of.clone()), *params, ball), extract),
-            _ => extract().map(Arc::new),
-        };
+        let boundary: std::result::Result<_, Infallible> =
+            match (self.boundaries, self.matter.identity) {
+                (Some(kept), Some(of)) => kept.get((Same(of.clone()), *params, ball), extract),
+                _ => extract().map(Arc::new),
+            };
         let Ok(boundary) = boundary;
         stats.ms.insert("boundary", milliseconds(start));
         let counts = boundary.counts;

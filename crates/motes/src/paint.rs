@@ -119,9 +119,11 @@ impl Paint {
                 let of = [names::CHAIN, names::MOLECULE_IDENTIFIER];
                 categories(category_column(particles, &of)?, coloring, nothing)
             }
-            ColorBy::Residue => {
-                categories(category_column(particles, &[names::RESIDUE_NAME])?, coloring, residue_color)
-            }
+            ColorBy::Residue => categories(
+                category_column(particles, &[names::RESIDUE_NAME])?,
+                coloring,
+                residue_color,
+            ),
             ColorBy::Property(name) => by_property(particles, coloring, name, range)?,
         };
         let own_color = match how {
@@ -223,9 +225,8 @@ fn element(name: &str) -> Option<Color> {
 /// Distinct colours for names or whole numbers: those that are `known`, else the palette's.
 fn categories(column: &Column, coloring: &Coloring, known: Known) -> (How, Meaning) {
     let (kinds, names) = kinds_of(column);
-    let color = |(i, name): (usize, &String)| {
-        Vec3::from(color_of((i, name), coloring, known).linear())
-    };
+    let color =
+        |(i, name): (usize, &String)| Vec3::from(color_of((i, name), coloring, known).linear());
     let colors: Vec<Vec3> = names.iter().enumerate().map(color).collect();
     let entries = names.into_iter().zip(colors.iter().copied()).collect();
     let meaning = Meaning::Categories { title: column.name.clone(), entries };

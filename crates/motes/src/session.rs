@@ -8,7 +8,8 @@ use motes_frame::{Background, Curve, Frame, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series, SimulationBox};
 use motes_scene::{
-    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Section, Show,
+    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene,
+    Section, Show,
 };
 
 use crate::annotate::{Annotated, annotations};
@@ -136,7 +137,8 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let mut series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let mut series =
+            scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let aged = series.iter_mut().zip(&scene.system).filter(|(_, s)| asks_for_ages(s));
         aged.for_each(|(series, _)| series.add_ages());
         let series = series.into_iter().map(|series| Arc::new(Mutex::new(series))).collect();
@@ -173,7 +175,9 @@ impl Session {
         scene.check()?;
         let sources = |s: &Scene| s.system.iter().map(|s| s.source.clone()).collect::<Vec<_>>();
         if sources(&scene) != sources(&self.scene) {
-            return Err(Error::Usage("the scene has other sources than those that are open".into()));
+            return Err(Error::Usage(
+                "the scene has other sources than those that are open".into(),
+            ));
         }
         let before = std::mem::replace(&mut self.scene, scene);
         for (i, system) in self.scene.system.iter().enumerate() {
@@ -273,8 +277,7 @@ impl Session {
         let drawn = self.draw((shot, after), layers, watch)?;
         let mut stats = drawn.stats;
         let start = Instant::now();
-        let annotated =
-            Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
+        let annotated = Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
         let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         stats.hash = format!("{:016x}", drawn.raw.hash());
@@ -510,12 +513,7 @@ impl Session {
     }
 
     /// Tone, cues, background and annotations.
-    fn finish(
-        &self,
-        raw: Frame,
-        resolved: &Resolved,
-        annotated: &Annotated<'_>,
-    ) -> Result<Frame> {
+    fn finish(&self, raw: Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Result<Frame> {
         let image = &self.scene.image;
         let mut shown = raw;
         let curve = match image.tone {
@@ -606,7 +604,9 @@ impl RangeKey {
 
 /// Makes a path absolute, so that a picture can be drawn again from any directory.
 pub(crate) fn make_absolute(source: &mut String) {
-    if !crate::open::is_made(source) && let Ok(path) = std::path::absolute(&*source) {
+    if !crate::open::is_made(source)
+        && let Ok(path) = std::path::absolute(&*source)
+    {
         *source = path.to_string_lossy().into_owned();
     }
 }

@@ -101,11 +101,11 @@ impl Stages {
         };
         self.build(&key, spare, (&mut particles, (scene, system)));
         self.particles = Some(particles.clone());
-        let paint = self.painted(&particles, PaintKey {
-            color: system.color.clone(),
-            opacity: system.opacity,
-            range,
-        }, system)?;
+        let paint = self.painted(
+            &particles,
+            PaintKey { color: system.color.clone(), opacity: system.opacity, range },
+            system,
+        )?;
         self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, (scene, system)));
         let Some((_, classes)) = &self.grids else { return Err(crate::Error::Cancelled) };
         let classes = classes.clone();
@@ -202,7 +202,9 @@ impl Stages {
             self.build(key, RadiusClasses::default(), of);
             self.particles = had;
         }
-        if let Some(classes) = self.grids.as_mut().and_then(|(_, c)| Arc::get_mut(c)).filter(|_| forget) {
+        if let Some(classes) =
+            self.grids.as_mut().and_then(|(_, c)| Arc::get_mut(c)).filter(|_| forget)
+        {
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
             (self.forgotten, self.visible) = (true, None);
         }
@@ -213,7 +215,8 @@ impl Stages {
         let system = &scene.system[body.number];
         let sections = scene.sections_of(body.number).map(|(_, section)| section.clone());
         let key = VisibleKey::of(system);
-        let cuts = CutKey { sections: sections.collect(), liquid: body.liquid, origin: body.origin };
+        let cuts =
+            CutKey { sections: sections.collect(), liquid: body.liquid, origin: body.origin };
         let had = self.visible.take().filter(|(had, ..)| *had == key);
         let (had_cuts, mut visible) = match had {
             Some((_, cuts, visible)) => (Some(cuts), visible),
@@ -314,7 +317,10 @@ mod tests {
             assert_eq!(shared(&before, &after), expected, "{assignments:?}");
             let fresh = load(&mut (Stages::default(), of.1.clone()), assignments);
             assert_eq!(after.count_visible(), fresh.count_visible(), "{assignments:?}");
-            assert_eq!(after.classes.grids[0].greatest_radius, fresh.classes.grids[0].greatest_radius);
+            assert_eq!(
+                after.classes.grids[0].greatest_radius,
+                fresh.classes.grids[0].greatest_radius
+            );
         }
         of.1 = Arc::new(Particles::clone(&of.1));
         assert_eq!(shared(&first, &load(&mut of, &[])), [false; 3]);

@@ -97,18 +97,14 @@ impl Loaded {
 }
 
 /// Boxes around what is `visible`, with radii, in world coordinates.
-pub(crate) fn boxes(
-    classes: &RadiusClasses,
-    visible: &[Visibility],
-    origin: DVec3,
-) -> Vec<Bounds> {
+pub(crate) fn boxes(classes: &RadiusClasses, visible: &[Visibility], origin: DVec3) -> Vec<Bounds> {
     let mut boxes = Vec::new();
     for (grid, visible) in classes.grids.iter().zip(visible) {
         let blocks = 0..grid.blocks.len() - 1;
         let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
-        boxes.extend(seen.map(|(low, high)| {
-            Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)
-        }));
+        boxes.extend(
+            seen.map(|(low, high)| Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)),
+        );
     }
     boxes
 }
@@ -181,7 +177,10 @@ pub(crate) fn asks_for_ages(system: &System) -> bool {
 }
 
 /// Whether colours or what is visible go by the particles' positions.
-pub(crate) fn asks_for_positions(particles: &Particles, (scene, system): (&Scene, &System)) -> bool {
+pub(crate) fn asks_for_positions(
+    particles: &Particles,
+    (scene, system): (&Scene, &System),
+) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {

@@ -196,7 +196,9 @@ impl Patch {
 
     /// cos of the angle between the surfaces of two neighbours.
     pub fn likeness(&self, a: usize, b: usize) -> f32 {
-        self.right[a] * self.right[b] + self.down[a] * self.down[b] + self.facing[a] * self.facing[b]
+        self.right[a] * self.right[b]
+            + self.down[a] * self.down[b]
+            + self.facing[a] * self.facing[b]
     }
 
     /// The distance at which the surface of `at` would be found a step beside it; `None` beyond its end, and

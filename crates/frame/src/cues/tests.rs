@@ -14,7 +14,8 @@ struct Ball([f32; 2], f32, f32);
 /// Balls in parallel projection, white, with pixels as world units.
 fn picture(balls: &[Ball], size: [usize; 2]) -> Frame {
     let [width, height] = size;
-    let (mut depth, mut normal) = (vec![f32::INFINITY; width * height], vec![[0.0; 3]; width * height]);
+    let (mut depth, mut normal) =
+        (vec![f32::INFINITY; width * height], vec![[0.0; 3]; width * height]);
     let (mut id, mut color) = (vec![-1i64; width * height], vec![[0.0; 4]; width * height]);
     for (at, depth) in depth.iter_mut().enumerate() {
         let p = [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5];
@@ -205,7 +206,8 @@ fn planes_have_no_lines_no_halos_and_no_rims() {
         ..cues()
     };
     let length = (1.0f32 + 4.0 + 1.0).sqrt();
-    let tilted = wall(|x, y| 100.0 + x + 2.0 * y * 0.5, [1.0 / length, -2.0 / length, -1.0 / length]);
+    let tilted =
+        wall(|x, y| 100.0 + x + 2.0 * y * 0.5, [1.0 / length, -2.0 / length, -1.0 / length]);
     for frame in [wall(|_, _| 50.0, [0.0, 0.0, -1.0]), tilted] {
         let dark = darkness(&all, frame);
         let worst = dark.iter().fold(0.0, |a: f32, b| a.max(*b));

@@ -22,8 +22,8 @@ use super::source::{Line, Source, poses, read};
 use super::table::{Cell, Table};
 use super::{Tables, chosen, hash, median, pool, surface_defaults, timed};
 use crate::density::{masks, optics, params};
-use crate::environment::environment;
 use crate::drawing::instruction_set;
+use crate::environment::environment;
 use crate::simulate::Simulated;
 use crate::{Error, Result, Watch, peak_memory_bytes};
 

@@ -33,7 +33,8 @@ pub(super) fn mask(options: &Tables) -> Result<Table> {
             times[2].push(ms);
         }
         let [plain, masked, step] = times.map(median);
-        let cells = vec![Cell::Ms(plain), Cell::Ms(masked), Cell::Factor(masked / plain), Cell::Ms(step)];
+        let cells =
+            vec![Cell::Ms(plain), Cell::Ms(masked), Cell::Factor(masked / plain), Cell::Ms(step)];
         table.push((name, liquid.stats().particles), cells, [hash_of(&liquid)]);
     }
     Ok(table)

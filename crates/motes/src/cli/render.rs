@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motes::{
-    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Section, Session, Shot, built_in_scene,
+    Film, FilmSettings, Layers, Picture, Scene, SceneError, Section, Session, Shot, built_in_scene,
     is_picture, read_scene,
 };
 
@@ -315,7 +315,6 @@ impl Args {
         }
         Ok(films)
     }
-
 }
 
 impl SceneFlags {
@@ -388,7 +387,9 @@ impl SceneFlags {
             scene.section.push(plane(section)?);
         }
         if look.cut.is_some() && scene.section.is_empty() {
-            return Err(Failure::usage("--cut: there is nothing to cut with; --section is a plane"));
+            return Err(Failure::usage(
+                "--cut: there is nothing to cut with; --section is a plane",
+            ));
         }
         set_flags(scene, &[("--cut", "section.cut", &look.cut)])?;
         for assignment in &self.set {

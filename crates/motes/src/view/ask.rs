@@ -9,7 +9,6 @@ use serde_json::{Map, Value, json};
 use super::guest::{Guest, lock};
 use super::inquire;
 use super::play::{Play, Running};
-use crate::session::Seen;
 use crate::{Error, Result};
 
 /// Largest canvas, pixels along a side and in all.
@@ -38,10 +37,7 @@ pub(super) fn answer(guest: &Guest, request: &Request, tell: &(dyn Fn(Value) + S
         "resize" => resize(guest, fields)?,
         "play" => play(guest, fields)?,
         "live" => live(guest, fields)?,
-        "pick" => return inquire_of(guest, |scene, seen| inquire::pick(scene, seen, numbers(fields, ["x", "y"])?)),
-        "select" => return inquire_of(guest, |scene, seen| inquire::choose(scene, seen, corners(fields)?)),
-        "histogram" => return inquire_of(guest, |_, seen| inquire::histogram(seen, fields)),
-        "check" => return inquire_of(guest, |_, seen| inquire::check(seen, fields)),
+        "pick" | "drag" | "select" | "histogram" | "check" => return inquire_of(guest, request),
         "scene" => return Ok(with("text", super::command::scene_text(&lock(&guest.state).seen()))),
         "command" => return Ok(with("text", super::command::command(&lock(&guest.state).seen()))),
         other => {
@@ -60,32 +56,43 @@ fn with(name: &str, value: impl Into<Value>) -> Map<String, Value> {
 }
 
 /// Answers from what was drawn last.
-fn inquire_of(guest: &Guest, of: impl FnOnce(&Scene, &Seen) -> Result<Value>) -> Answer {
+fn inquire_of(guest: &Guest, request: &Request) -> Answer {
+    let fields = &request.fields;
     let scene = lock(&guest.state).seen();
     let seen = lock(&guest.seen).clone();
     let seen = seen.ok_or_else(|| missing("a picture first"))?;
-    match of(&scene, &seen)? {
+    let answer = match request.what.as_str() {
+        "pick" => inquire::pick(&scene, &seen, [part(fields, "x")?, part(fields, "y")?]),
+        "drag" => inquire::drag(&scene, &seen, [point(fields, "from")?, point(fields, "to")?]),
+        "select" => inquire::choose(&scene, &seen, numbers(fields, "box")?),
+        "histogram" => inquire::histogram(&seen, fields),
+        _ => inquire::check(&seen, fields),
+    };
+    match answer? {
         Value::Object(answer) => Ok(answer),
         other => Ok(with("value", other)),
     }
 }
 
-/// Numbers by name, in 0 to 1.
-fn numbers<const N: usize>(fields: &Map<String, Value>, names: [&str; N]) -> Result<[f64; N]> {
-    let number = |name: &str| fields.get(name).and_then(Value::as_f64);
-    let all = names.map(number).map(|n| n.filter(|n| (0.0..=1.0).contains(n)));
-    match all.iter().all(Option::is_some) {
-        true => Ok(all.map(Option::unwrap_or_default)),
-        false => Err(missing(&format!("{}, each 0 to 1", names.join(", ")))),
-    }
+/// A number in 0 to 1.
+fn part(fields: &Map<String, Value>, name: &str) -> Result<f64> {
+    let number = fields.get(name).and_then(Value::as_f64).filter(|n| (0.0..=1.0).contains(n));
+    number.ok_or_else(|| missing(&format!("`{name}`, 0 to 1")))
 }
 
-/// The corners of a `box` of the picture.
-fn corners(fields: &Map<String, Value>) -> Result<[f64; 4]> {
-    let all = fields.get("box").and_then(Value::as_array);
+/// A point of the picture.
+fn point(fields: &Map<String, Value>, name: &str) -> Result<[f64; 2]> {
+    let point: [f64; 2] = numbers(fields, name)?;
+    let inside = point.iter().all(|n| (0.0..=1.0).contains(n));
+    if inside { Ok(point) } else { Err(missing(&format!("`{name}`, each 0 to 1"))) }
+}
+
+/// So many numbers.
+fn numbers<const N: usize>(fields: &Map<String, Value>, name: &str) -> Result<[f64; N]> {
+    let all = fields.get(name).and_then(Value::as_array);
     let all: Option<Vec<f64>> = all.and_then(|all| all.iter().map(Value::as_f64).collect());
-    let all = all.and_then(|all| <[f64; 4]>::try_from(all).ok());
-    all.ok_or_else(|| missing("`box`, as [x0, y0, x1, y1]"))
+    let all = all.and_then(|all| <[f64; N]>::try_from(all).ok());
+    all.ok_or_else(|| missing(&format!("`{name}`, a list of {N} numbers")))
 }
 
 fn missing(what: &str) -> Error {
@@ -118,9 +125,10 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
 fn put(scene: &mut Scene, path: &str, value: &Value) -> Result<()> {
     let value = match value {
         Value::Null => None,
-        value => Some(toml::Value::try_from(without_nulls(value)).map_err(|_| {
-            missing(&format!("for {path} a value that a scene can have"))
-        })?),
+        value => Some(
+            toml::Value::try_from(without_nulls(value))
+                .map_err(|_| missing(&format!("for {path} a value that a scene can have")))?,
+        ),
     };
     Ok(scene.put(path, value.as_ref())?)
 }
@@ -240,9 +248,8 @@ fn with_particles(source: &str, count: u64) -> String {
     let Some(simulation) = source.strip_prefix("sim:") else { return source.into() };
     let (name, query) = simulation.split_once('?').unwrap_or((simulation, ""));
     let others = query.split('&').filter(|p| !p.is_empty() && !p.starts_with("particles="));
-    let all: Vec<_> = std::iter::once(format!("particles={count}"))
-        .chain(others.map(str::to_owned))
-        .collect();
+    let all: Vec<_> =
+        std::iter::once(format!("particles={count}")).chain(others.map(str::to_owned)).collect();
     format!("sim:{name}?{}", all.join("&"))
 }
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use fearless_simd::{Level, dispatch};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use motes_grid::{Grid, Visibility};
 use motes_particles::read::names;
 use motes_particles::{Particles, Values, select};
-use motes_scene::{CameraView, Component, Element, Renderer, Scene};
+use motes_scene::{CameraView, Component, Element, Light, Renderer, Scene};
 use motes_spheres::{Counts, Packet};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -37,19 +37,44 @@ struct Found<'a> {
 /// shows; of a liquid what stands in it, else the ball that the eye meets first.
 pub(super) fn pick(scene: &Scene, seen: &Seen, at: [f64; 2]) -> Result<Value> {
     let view = view_of(scene, seen)?;
-    let [x, y] = [(at[0], view.width), (at[1], view.height)].map(|(part, pixels)| {
-        let pixel = (part * f64::from(pixels)).floor().clamp(0.0, f64::from(pixels) - 1.0);
-        pixel as f32 + 0.5
+    let place = [(at[0], view.width), (at[1], view.height)].map(|(part, pixels)| {
+        let last = f64::from(pixels) - 1.0;
+        (part * f64::from(pixels)).floor().clamp(0.0, last) + 0.5
     });
-    let ray = view.rays(seen.origin).ray(x, y);
-    let liquid = scene.renderer != Renderer::Spheres;
-    let found = match (&seen.loaded[..], liquid) {
-        (all, false) => sphere_at(all, ray, seen.origin),
-        ([], true) => None,
-        ([liquid, others @ ..], true) => sphere_at(others, ray, seen.origin)
-            .or_else(|| ball_at(liquid, ray, (scene.surface.ball as f32, seen.origin))),
-    };
+    let found = met(scene, seen, (&view, place));
     Ok(json!({"picked": found.map(|found| describe(scene, &found))}))
+}
+
+/// What the ray through a place of the picture (pixels) meets.
+fn met<'a>(
+    scene: &Scene,
+    seen: &'a Seen,
+    (view, place): (&CameraView, [f64; 2]),
+) -> Option<Found<'a>> {
+    let ray = view.rays(seen.origin).ray(place[0] as f32, place[1] as f32);
+    let about = (&scene.light, seen.origin);
+    match (&seen.loaded[..], scene.renderer) {
+        (all, Renderer::Spheres) => sphere_at(all, ray, about),
+        ([], _) => None,
+        ([liquid, others @ ..], _) => sphere_at(others, ray, about)
+            .or_else(|| ball_at(liquid, ray, (scene.surface.ball as f32, seen.origin))),
+    }
+}
+
+/// The cutting plane of a line that is drawn on the picture, 0 to 1 from the left and from the top.
+///
+/// # Errors
+/// The line has no length, or leads over nothing that is seen.
+pub(super) fn drag(scene: &Scene, seen: &Seen, ends: [[f64; 2]; 2]) -> Result<Value> {
+    let view = view_of(scene, seen)?;
+    let size = DVec2::new(f64::from(view.width), f64::from(view.height));
+    let [from, to] = ends.map(|at| DVec2::from_array(at) * size);
+    let depth = |x: u32, y: u32| {
+        let place = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+        Some(f64::from(met(scene, seen, (&view, place))?.depth))
+    };
+    let section = view.section_of_drag((from, to), &depth)?;
+    Ok(json!({"point": section.point, "normal": section.normal}))
 }
 
 /// The camera of the whole canvas, before what was seen.
@@ -63,20 +88,16 @@ fn view_of(scene: &Scene, seen: &Seen) -> Result<CameraView> {
 fn sphere_at<'a>(
     loaded: &'a [Loaded],
     (origin, direction): (Vec3, Vec3),
-    about: DVec3,
+    (light, about): (&Light, DVec3),
 ) -> Option<Found<'a>> {
-    let entries = Entries::new(loaded, &motes_scene::Light::default());
+    let entries = Entries::new(loaded, light);
     let mut packet = Packet::new();
     packet.push(origin, direction);
     dispatch!(Level::new(), simd =>
         motes_spheres::trace(simd, &mut packet, &entries.spheres, &mut Counts::default()));
     let (depth, entry, slot) = packet.hit(0)?;
-    let loaded = entries.system(entry);
-    let (at_grid, place) = entries.spheres.get(usize::from(entry))?.locate(slot);
-    // The entries end here, what they were made of does not.
-    let same = |grid: &&Grid| std::ptr::eq(*grid, at_grid);
-    let grid = loaded.classes.grids.iter().find(same)?;
-    Some(found(loaded, (grid, place), (depth, about)))
+    let (grid, place) = entries.spheres.get(usize::from(entry))?.locate(slot);
+    Some(found(entries.system(entry), (grid, place), (depth, about)))
 }
 
 fn found<'a>(
@@ -103,7 +124,9 @@ fn ball_at<'a>(
                 let depth = meets(grid.center(slot) - origin, radius, direction)?;
                 Some((depth, grid.index(slot), slot))
             });
-            met.min_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal))
+            met.min_by(|a, b| {
+                (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
+            })
         };
         let all = (0..grid.blocks.len() - 1).into_par_iter().filter_map(of_block);
         all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
@@ -135,7 +158,8 @@ fn describe(scene: &Scene, found: &Found<'_>) -> Value {
         .columns
         .iter()
         .map(|column| {
-            let all = (0..column.components).map(|c| value(&column.values, row * column.components + c));
+            let all =
+                (0..column.components).map(|c| value(&column.values, row * column.components + c));
             let mut all: Vec<Value> = all.collect();
             let value = if all.len() == 1 { all.remove(0) } else { all.into() };
             (column.name.clone(), value)
@@ -238,25 +262,30 @@ pub(super) fn histogram(seen: &Seen, fields: &Map<String, Value>) -> Result<Valu
     let property = find_property(particles, name, component(fields)?)?;
     let number = |row: usize| property.value(particles, row);
     let (none, rows) = ((f64::INFINITY, f64::NEG_INFINITY), 0..particles.len());
-    let (min, max) = rows.clone().into_par_iter().map(number).filter(|v| v.is_finite()).fold(
-        || none,
-        |(low, high), v| (v.min(low), v.max(high)),
-    ).reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (min, max) = rows
+        .clone()
+        .into_par_iter()
+        .map(number)
+        .filter(|v| v.is_finite())
+        .fold(|| none, |(low, high), v| (v.min(low), v.max(high)))
+        .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let scale = if max > min { bins as f64 / (max - min) } else { 0.0 };
     let empty = || (vec![0_u64; bins], 0_u64);
-    let (counts, missing) = rows.into_par_iter().with_min_len(1 << 14).map(number).fold(
-        empty,
-        |(mut counts, missing), v| {
+    let (counts, missing) = rows
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .map(number)
+        .fold(empty, |(mut counts, missing), v| {
             if !v.is_finite() {
                 return (counts, missing + 1);
             }
             counts[(((v - min) * scale) as usize).min(bins - 1)] += 1;
             (counts, missing)
-        },
-    ).reduce(empty, |(mut a, missing), (b, more)| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        (a, missing + more)
-    });
+        })
+        .reduce(empty, |(mut a, missing), (b, more)| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            (a, missing + more)
+        });
     Ok(json!({"min": min, "max": max, "counts": counts, "missing": missing}))
 }
 
@@ -278,7 +307,8 @@ pub(super) fn check(seen: &Seen, fields: &Map<String, Value>) -> Result<Value> {
 pub(super) fn check_changes((scene, before): (&Scene, &Scene), seen: &Seen) -> Result<()> {
     for loaded in &seen.loaded {
         let number = usize::from(loaded.number);
-        let (Some(system), Some(had)) = (scene.system.get(number), before.system.get(number)) else {
+        let (Some(system), Some(had)) = (scene.system.get(number), before.system.get(number))
+        else {
             continue;
         };
         let particles = &loaded.particles;
