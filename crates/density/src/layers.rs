@@ -4,10 +4,10 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::cut::Body;
 use crate::lanes::LANES;
-use crate::march;
 use crate::normals::gradients;
-use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
+use crate::rays::{Hits, OUTSIDE, Rays};
 use crate::shade::Liquid;
 use crate::view::View;
 
@@ -32,26 +32,21 @@ pub struct Seen {
 /// What the rays through the pixels of a view meet, row by row.
 pub fn layers(liquid: &Liquid<'_>, view: &View) -> Vec<Seen> {
     let rows = (0..view.size.1).into_par_iter();
-    rows.flat_map_iter(|y| row(liquid, view, y)).collect()
+    let cuts = liquid.cuts();
+    rows.flat_map_iter(|y| row(&liquid.body(cuts.as_ref()), view, y)).collect()
 }
 
-/// The medium at a place in voxels.
-pub(crate) fn medium(liquid: &Liquid<'_>, place: Vec3) -> u32 {
-    let wet = liquid.field.at(place) >= liquid.space.threshold;
-    if wet { LIQUID } else { OUTSIDE }
-}
-
-fn row(liquid: &Liquid<'_>, view: &View, y: u32) -> Vec<Seen> {
-    let Liquid { field, space, level } = *liquid;
+fn row(body: &Body<'_>, view: &View, y: u32) -> Vec<Seen> {
+    let Body { field, space, cuts, level } = *body;
     let lattice = &field.lattice;
     let (mut rays, mut hits) = (Rays::default(), Hits::default());
     for x in 0..view.size.0 {
         let (origin, direction) = view.rays.ray(x as f32 + 0.5, y as f32 + 0.5);
         let place = lattice.place(origin);
-        rays.push(place, direction, medium(liquid, place));
+        rays.push(place, direction, body.medium(place));
     }
-    let thickness = passed(liquid, rays.clone());
-    dispatch!(level, simd => march::march(simd, (field, space), &mut rays, &mut hits));
+    let thickness = passed(body, rays.clone());
+    body.march(&mut rays, &mut hits);
     let count = rays.len();
     let mut rows = [0, 1, 2].map(|_| vec![0.0; count.next_multiple_of(LANES)]);
     let met = |ray: usize| hits.distance[ray].is_finite();
@@ -67,9 +62,11 @@ fn row(liquid: &Liquid<'_>, view: &View, y: u32) -> Vec<Seen> {
             return Seen { distance: f32::INFINITY, point, normal, drop: None, thickness };
         }
         let drop = space.drops.drops.get(hits.surface[ray] as usize);
-        let out = match drop {
-            Some(drop) => place(ray) - drop.center,
-            None => -Vec3::new(rows[0][ray], rows[1][ray], rows[2][ray]),
+        let cap = cuts.filter(|_| hits.cap[ray] > 0);
+        let out = match (cap, drop) {
+            (Some(cuts), _) => -cuts.normal(hits.cap[ray]),
+            (_, Some(drop)) => place(ray) - drop.center,
+            _ => -Vec3::new(rows[0][ray], rows[1][ray], rows[2][ray]),
         };
         let normal = out.normalize_or(-rays.direction(ray));
         let toward = if normal.dot(rays.direction(ray)) > 0.0 { -normal } else { normal };
@@ -85,8 +82,8 @@ fn row(liquid: &Liquid<'_>, view: &View, y: u32) -> Vec<Seen> {
 }
 
 /// Length of liquid along each ray, world units.
-pub(crate) fn passed(liquid: &Liquid<'_>, mut rays: Rays) -> Vec<f32> {
-    let Liquid { field, space, level } = *liquid;
+pub(crate) fn passed(body: &Body<'_>, mut rays: Rays) -> Vec<f32> {
+    let field = body.field;
     let mut hits = Hits::default();
     let mut sums = vec![0.0; rays.len()];
     let mut which: Vec<usize> = (0..rays.len()).collect();
@@ -94,7 +91,7 @@ pub(crate) fn passed(liquid: &Liquid<'_>, mut rays: Rays) -> Vec<f32> {
         if which.is_empty() {
             break;
         }
-        dispatch!(level, simd => march::march(simd, (field, space), &mut rays, &mut hits));
+        body.march(&mut rays, &mut hits);
         let (mut next, mut going) = (Rays::default(), Vec::new());
         for (ray, pixel) in which.iter().enumerate() {
             let distance = hits.distance[ray];

@@ -14,6 +14,7 @@
 mod bins;
 mod bits;
 mod crossing;
+mod cut;
 mod drops;
 mod field;
 mod fine;

@@ -5,18 +5,16 @@
 //! light goes (Snell, Fresnel, total internal reflection: [`motes_scene::optics`]), and what goes the other way
 //! is seen without further boundaries if it leaves the liquid, and else goes with the rest.
 
-use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{dispatch, f32x16, mask32x16, prelude::*, u32x16};
 use fearless_simd_macros::simd;
 use glam::{Vec3, Vec4};
 use motes_scene::exp;
 
-use crate::field::Field;
+use crate::cut::{Body, Cuts};
 use crate::lanes::{LANES, Lanes, V3};
-use crate::march;
 use crate::normals::sixteen;
 use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
 use crate::shade::{Around, Optics};
-use crate::space::Space;
 use crate::surroundings::{self, Sights, lane_of, store};
 
 /// How much wider cones of neighbouring paths become at a boundary, per unit of length.
@@ -27,11 +25,9 @@ const FAINT: f32 = 0.03;
 /// What paths go through.
 #[derive(Clone, Copy)]
 pub(crate) struct Caster<'a> {
-    pub field: &'a Field,
-    pub space: &'a Space,
+    pub body: Body<'a>,
     pub optics: &'a Optics,
     pub around: &'a Around<'a>,
-    pub level: Level,
 }
 
 /// Paths and their rays. Rows are longer than they are many.
@@ -77,6 +73,8 @@ struct Boundary<S: Simd> {
     /// The medium behind it, of one that comes from outside.
     surface: u32x16<S>,
     inside: mask32x16<S>,
+    /// Which are none: where a cut is open.
+    open: mask32x16<S>,
 }
 
 /// What becomes of light at sixteen boundaries, see [`motes_scene::optics::Split`].
@@ -153,15 +151,15 @@ impl Caster<'_> {
         let wave = &mut desk.now;
         wave.clear();
         let spread = rays.pixel / finer as f32;
-        dispatch!(self.level, simd => set_out(simd, (self, rays, spread), (places, light.len()), wave));
+        dispatch!(self.body.level, simd => set_out(simd, (self, rays, spread), (places, light.len()), wave));
         for number in 1..=self.optics.depth {
             if desk.now.rays.len() == 0 {
                 break;
             }
             let Desk { now, next, hits } = &mut *desk;
             next.clear();
-            dispatch!(self.level, simd => {
-                march::march(simd, (self.field, self.space), &mut now.rays, hits);
+            self.body.march(&mut now.rays, hits);
+            dispatch!(self.body.level, simd => {
                 follow(simd, (self, number), (now, hits), next, light);
             });
             std::mem::swap(&mut desk.now, &mut desk.next);
@@ -177,11 +175,8 @@ fn set_out<S: Simd>(
     (places, count): (&[Vec<f32>; 2], usize),
     wave: &mut Wave,
 ) {
-    let lattice = &caster.field.lattice;
-    let medium = |point: Vec3| {
-        let wet = caster.field.at(lattice.place(point)) >= caster.space.threshold;
-        if wet { LIQUID } else { OUTSIDE }
-    };
+    let lattice = &caster.body.field.lattice;
+    let medium = |point: Vec3| caster.body.medium(lattice.place(point));
     let perspective = rays.projection == motes_scene::Projection::Perspective;
     let of_eye = medium(rays.origin);
     let splat = |v: f32| f32x16::splat(simd, v);
@@ -246,7 +241,7 @@ fn some<S: Simd>(
     (at, there): (usize, mask32x16<S>),
     (next, light): (&mut Wave, &mut [Vec4]),
 ) {
-    let (lattice, zero) = (&caster.field.lattice, f32x16::splat(simd, 0.0));
+    let (lattice, zero) = (&caster.body.field.lattice, f32x16::splat(simd, 0.0));
     let far = f32x16::splat(simd, f32::INFINITY);
     let mut paths = wave.load(simd, at);
     let origin = V3::load(simd, &wave.rays.origin, at);
@@ -286,10 +281,14 @@ fn some<S: Simd>(
     let t = on.select(distance, zero);
     let place = origin.along(direction, t);
     let surface = u32x16::from_slice(simd, &hits.surface[at..at + LANES]);
-    let mut out = -sixteen(simd, caster.field, place);
+    let mut out = -sixteen(simd, caster.body.field, place);
     let in_drops = !surface.simd_eq(u32x16::splat(simd, LIQUID)) & on;
     if in_drops.any_true() {
         out = caster.ways_out(simd, (out, place), (surface, in_drops));
+    }
+    let mut open = mask32x16::splat(simd, false);
+    if let Some(cuts) = caster.body.cuts {
+        (out, open) = of_caps(simd, cuts, (out, on), &hits.cap[at..at + LANES]);
     }
     let back = V3::select(inside, direction, -direction);
     let out = out.normalize_or(back);
@@ -298,7 +297,7 @@ fn some<S: Simd>(
     paths.width = paths.spread.mul_add(t * lattice.voxel, paths.width);
     paths.spread += PART;
     let normal = V3::select(inside, -out, out);
-    let met = Boundary { place, direction, normal, surface, inside };
+    let met = Boundary { place, direction, normal, surface, inside, open };
     // Of what is faint, or has met enough, what lies behind is seen.
     let [r, g, b] = paths.weight.0;
     let faint = r.max(g).max(b).simd_lt(f32x16::splat(simd, FAINT));
@@ -311,6 +310,29 @@ fn some<S: Simd>(
     caster.go_on(simd, (on & !first, &paths), &met, (next, light));
 }
 
+/// The ways out of those of sixteen boundaries that are caps, and which of these are open; `out` elsewhere.
+#[inline(always)]
+fn of_caps<S: Simd>(
+    simd: S,
+    cuts: &Cuts,
+    (out, mask): (V3<S>, mask32x16<S>),
+    caps: &[u32],
+) -> (V3<S>, mask32x16<S>) {
+    let (mut ways, mut open) = (store(out), 0);
+    let mut left = mask.to_bitmask();
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        left &= left - 1;
+        if caps[lane] > 0 {
+            let way = -cuts.normal(caps[lane]);
+            (0..3).for_each(|a| ways[a].0[lane] = way[a]);
+            open |= u64::from(cuts.is_open(caps[lane])) << lane;
+        }
+    }
+    let of = |row: &Lanes<f32>| f32x16::from_slice(simd, &row.0);
+    (V3([of(&ways[0]), of(&ways[1]), of(&ways[2])]), mask32x16::from_bitmask(simd, open))
+}
+
 impl Caster<'_> {
     #[inline(always)]
     fn sights<S: Simd>(
@@ -320,7 +342,7 @@ impl Caster<'_> {
         (place, direction): (V3<S>, V3<S>),
         reach: f32x16<S>,
     ) -> Sights<S> {
-        let lattice = &self.field.lattice;
+        let lattice = &self.body.field.lattice;
         let voxel = f32x16::splat(simd, lattice.voxel);
         let origin = V3::splat(simd, lattice.low).along(place, voxel);
         Sights { origin, direction, reach, width: paths.width, spread: paths.spread }
@@ -429,7 +451,7 @@ impl Caster<'_> {
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            let center = self.space.drops.drops[drops.0[lane] as usize].center;
+            let center = self.body.space.drops.drops[drops.0[lane] as usize].center;
             let way = lane_of(&places, lane) - center;
             (0..3).for_each(|a| ways[a].0[lane] = way[a]);
         }
@@ -448,7 +470,7 @@ impl Caster<'_> {
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            let color = paint.color(self.field.lattice.point(lane_of(&places, lane)));
+            let color = paint.color(self.body.field.lattice.point(lane_of(&places, lane)));
             let tint = -color.clamp(Vec3::splat(0.02), Vec3::ONE).map(f32::ln) * mean;
             (0..3).for_each(|c| tints[c].0[lane] = tint[c]);
         }
@@ -464,6 +486,7 @@ impl<S: Simd> Boundary<S> {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let (direction, normal) = (self.direction, self.normal);
         let eta = self.inside.select(f32x16::splat(simd, ior), f32x16::splat(simd, 1.0 / ior));
+        let eta = self.open.select(one, eta);
         let cos1 = (-direction.dot(normal)).max(zero).min(one);
         let reflected = direction.along(normal, cos1 * 2.0).normalize_or(normal);
         let sin2 = eta * eta * (1.0 - cos1 * cos1);

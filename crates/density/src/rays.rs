@@ -32,6 +32,8 @@ pub(crate) struct Hits {
     pub distance: Vec<f32>,
     /// [`LIQUID`] or the drop whose surface it is.
     pub surface: Vec<u32>,
+    /// The face of a cut that it is a cap of, counted from 1; 0: of none.
+    pub cap: Vec<u32>,
 }
 
 impl Rays {
@@ -121,5 +123,7 @@ impl Hits {
         self.distance.resize(room, f32::INFINITY);
         self.surface.clear();
         self.surface.resize(room, LIQUID);
+        self.cap.clear();
+        self.cap.resize(room, 0);
     }
 }

@@ -2,9 +2,11 @@
 
 use fearless_simd::Level;
 use glam::{Vec3, Vec4};
+use motes_grid::Clip;
 use motes_scene::{Beyond, Sight};
 use rayon::prelude::*;
 
+use crate::cut::{Body, Cuts};
 use crate::field::Field;
 use crate::lanes::LANES;
 use crate::paths::{Caster, Desk};
@@ -67,8 +69,22 @@ pub struct Liquid<'a> {
     pub field: &'a Field,
     /// What was found in it.
     pub space: &'a Space,
+    /// What cuts leave of it, about the origin of the particles; none: all.
+    pub clip: Option<&'a Clip>,
     /// The instruction set.
     pub level: Level,
+}
+
+impl Liquid<'_> {
+    /// Its cuts, in voxels.
+    pub(crate) fn cuts(&self) -> Option<Cuts> {
+        self.clip.map(|clip| Cuts::new(clip, &self.field.lattice))
+    }
+
+    /// What rays go through, with these cuts.
+    pub(crate) fn body<'b>(&'b self, cuts: Option<&'b Cuts>) -> Body<'b> {
+        Body { field: self.field, space: self.space, cuts, level: self.level }
+    }
 }
 
 /// The picture: linear, premultiplied colours, row by row. With `finer` above 1, a pixel that differs from one
@@ -79,8 +95,9 @@ pub fn shade(
     (optics, around): (&Optics, &Around<'_>),
     finer: u32,
 ) -> Vec<[f32; 4]> {
-    let Liquid { field, space, level } = *liquid;
-    let caster = Caster { field, space, optics, around, level };
+    let cuts = liquid.cuts();
+    let body = liquid.body(cuts.as_ref());
+    let caster = Caster { body, optics, around };
     let finer = finer.max(1) as usize;
     let artist = Artist { caster, view, finer };
     let width = view.size.0 as usize;

@@ -32,6 +32,8 @@ impl Shadow {
     /// `fill` is the part of the light that comes from elsewhere.
     pub fn new(liquid: &Liquid<'_>, toward: Vec3, (extinction, fill): (f32, f32)) -> Self {
         let Liquid { field, space, .. } = *liquid;
+        let cuts = liquid.cuts();
+        let body = liquid.body(cuts.as_ref());
         let lattice = &field.lattice;
         let [low, high] = space.bounds.map(|corner| lattice.point(corner));
         let center = low.midpoint(high);
@@ -47,7 +49,7 @@ impl Shadow {
                 let start = center + across[0] * a + across[1] * b + toward * size;
                 rays.push(lattice.place(start), -toward, OUTSIDE);
             }
-            for (left, passed) in row.iter_mut().zip(passed(liquid, rays)) {
+            for (left, passed) in row.iter_mut().zip(passed(&body, rays)) {
                 *left = (-extinction * passed).exp();
             }
         });

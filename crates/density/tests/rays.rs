@@ -62,7 +62,7 @@ fn rays_meet_the_surface_where_the_definition_says() {
     let particles = Particles { positions: &positions, radii: Radii::Uniform(radius), masks: None };
     let params = Params { rough: false, ..Params::with_voxel(2.0 * radius) };
     let (field, space) = made(&particles, &params);
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     let view = view(Vec3::new(0.5, 0.5, 0.3), 4.0, 1.9, (40, 30));
     let lattice = &field.lattice;
     let (mut hits, mut misses, mut missed) = (0, 0, 0);
@@ -116,7 +116,7 @@ fn a_lone_particle_is_seen_as_a_ball_of_glass() {
         let params = Params::with_voxel(voxel);
         let (field, space) = made(&particles, &params);
         assert_eq!(space.drop_count(), 1);
-        let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+        let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
         let view = view(center, 6.0, 2.0, (64, 48));
         let picture = shade(&liquid, &view, (&CLEAR, &AROUND), 1);
         let (mut worst, mut seen) = (0.0_f32, 0);
@@ -153,7 +153,7 @@ fn a_ball_of_liquid_is_a_lens() {
     // Near half of the density: where the liquid ends.
     let params = Params { support: 8.0, threshold: 0.35, ..Params::with_voxel(spacing) };
     let (field, space) = made(&particles, &params);
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     let view = view(Vec3::ZERO, 5.0, 2.6, (96, 72));
     let seen = layers(&liquid, &view);
     // Its radius is as that of the density.
@@ -192,7 +192,7 @@ fn absorption_and_shadow_are_those_of_the_length() {
     let positions = [center.to_array()];
     let particles = Particles { positions: &positions, radii: Radii::Uniform(0.5), masks: None };
     let (field, space) = made(&particles, &Params::with_voxel(1.0));
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     // Of the index of what is around, light goes straight on.
     let absorption = Vec3::new(0.2, 0.7, 3.0);
     let straight = Optics { ior: 1.0, absorption, depth: 4 };
@@ -237,7 +237,7 @@ fn picture(params: &Params, masks: Option<&[Mask]>) -> (Vec<f32>, Vec<[f32; 4]>,
     let (mut field, mut space) = (Field::default(), Space::default());
     field.fill_counted(&particles, params, Level::new());
     space.fill(&field, (&particles, params), Level::new());
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     let view = view(Vec3::new(0.5, 0.5, 0.4), 4.0, 1.8, (120, 90));
     let depths = layers(&liquid, &view).iter().map(|s| s.distance / field.lattice.voxel).collect();
     (depths, shade(&liquid, &view, (&CLEAR, &AROUND), 1), field.counts.updates)
@@ -323,7 +323,7 @@ fn finer_pixels_are_means() {
     let (positions, radius) = dam(12);
     let particles = Particles { positions: &positions, radii: Radii::Uniform(radius), masks: None };
     let (field, space) = made(&particles, &Params::with_voxel(2.0 * radius));
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     let at = |size, finer| {
         let view = view(Vec3::new(0.5, 0.5, 0.4), 4.0, 1.8, size);
         shade(&liquid, &view, (&CLEAR, &AROUND), finer)
@@ -344,7 +344,7 @@ fn rays_from_anywhere_end() {
     let (positions, radius) = dam(10);
     let particles = Particles { positions: &positions, radii: Radii::Uniform(radius), masks: None };
     let (field, space) = made(&particles, &Params::with_voxel(2.0 * radius));
-    let liquid = Liquid { field: &field, space: &space, level: Level::new() };
+    let liquid = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
     let mut random = Random(3);
     for _ in 0..40 {
         let mut eye = view(Vec3::splat(0.5), 1.0, 3.0, (16, 16));

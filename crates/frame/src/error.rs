@@ -20,6 +20,12 @@ pub enum FrameError {
         /// How many pixels the layer has.
         found: usize,
     },
+    /// A layer that is needed and not there.
+    #[error("the frame has no layer `{layer}`")]
+    NoLayer {
+        /// The layer's name.
+        layer: &'static str,
+    },
     /// Two pictures that cannot be compared pixel by pixel.
     #[error("expected a picture of {}×{} pixels, found {}×{}", .expected.0, .expected.1, .found.0, .found.1)]
     PictureSize {

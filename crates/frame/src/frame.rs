@@ -1,6 +1,7 @@
 //! A picture as its renderer leaves it: colour and the layers beside it.
 
 use std::hash::Hasher;
+use std::sync::Arc;
 
 use crate::{FrameError, Result};
 
@@ -14,7 +15,8 @@ pub struct Frame {
     width: usize,
     height: usize,
     color: Vec<[f32; 4]>,
-    layers: Vec<Layer>,
+    /// Shared by the frame and its copies, which differ in colour.
+    layers: Arc<Vec<Layer>>,
 }
 
 /// What is known of each pixel besides its colour, from the one ray through its centre.
@@ -98,7 +100,7 @@ impl Frame {
     /// If `color` does not hold `width · height` pixels.
     pub fn new(width: usize, height: usize, color: Vec<[f32; 4]>) -> Result<Frame> {
         check_size(width, height, "color", color.len())?;
-        Ok(Frame { width, height, color, layers: Vec::new() })
+        Ok(Frame { width, height, color, layers: Arc::default() })
     }
 
     /// The same frame with `layer`, in place of the one of that name if there was one.
@@ -108,9 +110,10 @@ impl Frame {
     /// If the layer does not hold `width · height` pixels.
     pub fn with(mut self, layer: Layer) -> Result<Frame> {
         check_size(self.width, self.height, layer.name(), layer.values().pixels())?;
-        match self.layers.iter_mut().find(|l| l.name() == layer.name()) {
+        let layers = Arc::make_mut(&mut self.layers);
+        match layers.iter_mut().find(|l| l.name() == layer.name()) {
             Some(old) => *old = layer,
-            None => self.layers.push(layer),
+            None => layers.push(layer),
         }
         Ok(self)
     }
@@ -133,6 +136,11 @@ impl Frame {
     /// The colours, to be changed in place.
     pub fn color_mut(&mut self) -> &mut [[f32; 4]] {
         &mut self.color
+    }
+
+    /// The colours, to be changed in place, and the layers.
+    pub(crate) fn color_and_layers(&mut self) -> (&mut [[f32; 4]], &[Layer]) {
+        (&mut self.color, &self.layers)
     }
 
     /// The layers besides colour, in the order they were added.

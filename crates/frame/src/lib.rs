@@ -13,6 +13,7 @@
 mod annotate;
 mod background;
 mod compare;
+mod cues;
 mod error;
 mod exr;
 mod file;
@@ -29,6 +30,7 @@ pub use annotate::{
 };
 pub use background::Background;
 pub use compare::{Difference, compare};
+pub use cues::{Cues, Eye, Fade, Stroke};
 pub use error::{FrameError, Result};
 pub use exr::write_exr;
 pub use file::{Unfinished, save};

@@ -208,10 +208,17 @@ impl Clip {
         Self { clauses: exact.cloned().collect() }
     }
 
-    /// The clauses that go by centres, which rays need not ask.
-    pub fn by_center(&self) -> Self {
-        let by_center = self.clauses.iter().filter(|clause| !clause.is_exact());
-        Self { clauses: by_center.cloned().collect() }
+    /// The same for particles that make a liquid, which is cut where rays pass: they go by their centres, and by exact
+    /// cuts only those that lie more than `margin` beyond.
+    pub fn of_liquid(&self, margin: f32) -> Self {
+        let mut clip = self.clone();
+        for face in clip.clauses.iter_mut().flat_map(|clause| &mut clause.faces) {
+            if face.cut != Cut::Center {
+                face.cut = Cut::Center;
+                face.plane.offset -= margin;
+            }
+        }
+        clip
     }
 
     /// All faces, clause by clause.

@@ -292,6 +292,9 @@ fn nearest_distances_are_those_of_brute_force() {
     let lattice: Vec<[f32; 3]> =
         (0..1000).map(|i| [(i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32]).collect();
     assert_eq!(build(&lattice).median_spacing(), Some(1.0));
+    // A ball of radius 2 about a point of the lattice holds 27 of its points: those closer than 2.
+    let edge = (32.0 * std::f32::consts::PI / 3.0 / 27.0).cbrt();
+    assert!((build(&lattice).share_edge().unwrap() - edge).abs() < 1e-5);
 }
 
 #[test]

@@ -10,7 +10,78 @@ use motes_particles::read::names;
 use motes_scene::{Scene, Section};
 
 use crate::paint::{category_column, kinds_of};
+use crate::system::mark;
 use crate::{Error, Result};
+
+/// What is visible of a system: what passes the filters, less what sections cut away.
+#[derive(Clone)]
+pub(crate) struct Visible {
+    passes: Vec<Pass>,
+    /// What is visible of all passes, where there are several.
+    merged: Vec<Visibility>,
+}
+
+impl Visible {
+    /// What passes the filters, without cuts.
+    pub fn uncut(classes: &RadiusClasses, visible: Vec<Visibility>) -> Self {
+        Self { passes: vec![Pass::new(classes, (None, visible))], merged: Vec::new() }
+    }
+
+    /// What sections leave, to be cut.
+    pub fn nothing() -> Self {
+        Self { passes: Vec::new(), merged: Vec::new() }
+    }
+
+    /// Goes over to the sections of `scene`: made anew where other particles than before are cut alike, else the
+    /// blocks that change alone. `visible` is what passes the filters, of all particles or of those to be kept.
+    ///
+    /// # Errors
+    /// A section cannot be, or names types where there are none; or those of `visible`.
+    pub fn cut(
+        &mut self,
+        body: Body<'_>,
+        scene: &Scene,
+        visible: impl Fn(Option<Keep<'_>>) -> Result<Vec<Visibility>>,
+    ) -> Result<()> {
+        body.cut(scene, &mut self.passes, visible)?;
+        self.merged.clear();
+        if self.passes.len() > 1 {
+            let mut seen = vec![false; body.particles.len()];
+            self.passes.iter().for_each(|pass| mark(body.classes, pass.visible(), &mut seen));
+            let keep = |i: u32| seen[i as usize];
+            let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
+            self.merged = body.classes.grids.iter().map(of).collect();
+        }
+        Ok(())
+    }
+
+    /// Those that are cut alike.
+    pub fn passes(&self) -> &[Pass] {
+        &self.passes
+    }
+
+    /// All that is visible, grid by grid.
+    pub fn all(&self) -> &[Visibility] {
+        match &self.passes[..] {
+            [pass] => pass.visible(),
+            _ => &self.merged,
+        }
+    }
+
+    /// The cuts of a liquid that its rays ask, if there are any.
+    pub fn clip(&self) -> Option<&Clip> {
+        match &self.passes[..] {
+            [pass] => pass.clip(),
+            _ => None,
+        }
+    }
+
+    /// Bytes of all parts.
+    pub fn bytes(&self) -> usize {
+        let merged = self.merged.iter().map(Visibility::bytes).sum::<usize>();
+        merged + self.passes.iter().map(Pass::bytes).sum::<usize>()
+    }
+}
 
 /// Particles of a system that the same sections cut.
 #[derive(Clone)]
@@ -23,11 +94,6 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    /// All particles, and what is visible of them, without cuts.
-    pub fn uncut(classes: &RadiusClasses, visible: Vec<Visibility>) -> Self {
-        Self::new(classes, (None, visible))
-    }
-
     fn new(classes: &RadiusClasses, (kinds, base): (Option<Vec<bool>>, Vec<Visibility>)) -> Self {
         let sections = Sections::new(&classes.grids, base, Width::default());
         Self { kinds, sections, exact: Clip::default() }
@@ -63,7 +129,7 @@ pub(crate) struct Body<'a> {
     pub number: usize,
     /// What positions are given about.
     pub origin: DVec3,
-    /// Whether it is seen as a liquid, which is cut where rays pass: particles are left out by centre alone.
+    /// Whether it is seen as a liquid, which is cut where rays pass, not particle by particle.
     pub liquid: bool,
 }
 
@@ -71,6 +137,12 @@ pub(crate) struct Body<'a> {
 pub(crate) type Keep<'a> = &'a (dyn Fn(u32) -> bool + Sync);
 
 impl Body<'_> {
+    /// How far beyond a cut particles of a liquid still count, as gaps are bridged and surfaces smoothed over it.
+    fn margin(&self) -> f32 {
+        const RADII: f32 = 16.0;
+        RADII * self.classes.grids.iter().map(|grid| grid.greatest_radius).fold(0.0, f32::max)
+    }
+
     /// Cuts `passes` as the scene says: made anew where other particles than before are cut alike, else the
     /// blocks that change alone. `visible` is what passes the filters, of all particles or of those to be kept.
     ///
@@ -98,7 +170,7 @@ impl Body<'_> {
         for (pass, scope) in passes.iter_mut().zip(&scopes) {
             let clip = clip_of(&scope.sections, self.origin)?;
             pass.exact = clip.exact();
-            let clip = if self.liquid { clip.by_center() } else { clip };
+            let clip = if self.liquid { clip.of_liquid(self.margin()) } else { clip };
             pass.sections.set(&self.classes.grids, clip);
         }
         Ok(())

@@ -16,12 +16,14 @@ use motes_grid::{Grid, Radii, Resolution, Visibility};
 use motes_particles::read::names;
 use motes_scene::{Beyond, Bounds, Environment, Lights, Resolved, Scene};
 
+use crate::cut::Visible;
 use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::memo::{Memo, Same};
+use crate::nearest::Nearest;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
-use crate::system::{Cuts, Loaded};
+use crate::system::Loaded;
 use crate::{Error, Result, Watch};
 
 /// The visible particles of a system, one after the other.
@@ -148,8 +150,8 @@ pub(crate) struct Made {
 /// Fields from one picture to the next.
 pub(crate) struct Fields {
     /// By what is visible, how it is made, and whether with masks.
-    made: Memo<(Same<Cuts>, Params, bool), Made>,
-    mean_radii: Memo<Same<Cuts>, f64>,
+    made: Memo<(Same<Visible>, Params, bool), Made>,
+    mean_radii: Memo<Same<Visible>, f64>,
 }
 
 impl Default for Fields {
@@ -200,9 +202,10 @@ impl Cast<'_> {
         let made = self.made(bounds, stats);
         let Made { cloud, field, space } = &*made;
         stage(1)?;
-        let liquid = Liquid { field, space, level: self.level };
+        let clip = self.system.clip();
+        let liquid = Liquid { field, space, clip, level: self.level };
         let setting = (environment, optics(self.scene, bounds));
-        let color = self.shade((&liquid, &view), (cloud, &setting), stats);
+        let color = self.shade((&liquid, &view), &setting, stats);
         stage(2)?;
         let frame = Frame::new(view.size.0 as usize, view.size.1 as usize, color)?;
         if !with {
@@ -217,7 +220,7 @@ impl Cast<'_> {
     fn made(&self, bounds: Bounds, stats: &mut Stats) -> Arc<Made> {
         let longest = (bounds.max - bounds.min).max_element();
         let masked = self.scene.density.mask;
-        let visible = || Same(self.system.cuts.clone());
+        let visible = || Same(self.system.visible.clone());
         let mean_radius = || Ok::<_, Infallible>(mean_radius(self.system));
         let Ok(mean_radius) = self.fields.mean_radii.get(visible(), mean_radius);
         let params = params(self.scene, (*mean_radius, longest));
@@ -252,7 +255,7 @@ impl Cast<'_> {
     fn shade(
         &self,
         (liquid, view): (&Liquid<'_>, &View),
-        (cloud, (environment, optics)): (&Cloud, &(Environment, Optics)),
+        (environment, optics): &(Environment, Optics),
         stats: &mut Stats,
     ) -> Vec<[f32; 4]> {
         let lights: Lights = self.resolved.lights.about(self.origin);
@@ -264,7 +267,7 @@ impl Cast<'_> {
         stats.ms.insert("shadow", milliseconds(start));
         let start = Instant::now();
         let painted = self.system.paint.uniform().is_none();
-        let colors = painted.then(|| Colors { nearest: Nearest::new(cloud), cast: self });
+        let colors = painted.then(|| Colors { nearest: Nearest::new(self.system), cast: self });
         let scenery = self.others.map(|o| Scenery::new(environment, o, (&lights, self.level)));
         let around = Around {
             beyond: scenery.as_ref().map_or(environment as &dyn Beyond, |s| s),
@@ -281,7 +284,7 @@ impl Cast<'_> {
     /// Adds what is known of each pixel besides its colour.
     fn with_layers(&self, frame: Frame, (seen, cloud): (&[Seen], &Cloud)) -> Result<Frame> {
         let count = frame.color().len();
-        let nearest = Nearest::new(cloud);
+        let nearest = Nearest::new(self.system);
         let nothing = Seen {
             distance: f32::INFINITY,
             point: Vec3::ZERO,
@@ -305,44 +308,6 @@ impl Cast<'_> {
             .with(Layer::Id((0..count).map(id).collect()))?
             .with(Layer::System(vec![self.system.number; count]))?
             .with(Layer::Thickness((0..count).map(|p| of(p).thickness).collect()))?)
-    }
-}
-
-/// Finds the visible particle nearest to a point.
-struct Nearest<'a> {
-    cloud: &'a Cloud,
-    /// None without particles.
-    grid: Option<Grid>,
-    reach: f32,
-}
-
-impl<'a> Nearest<'a> {
-    fn new(cloud: &'a Cloud) -> Self {
-        let radius = cloud.mean_radius as f32;
-        let some = !cloud.positions.is_empty();
-        Self { cloud, grid: some.then(|| grid_of(&cloud.positions, radius)), reach: 2.0 * radius }
-    }
-
-    /// Its index in the file's order; of several as near the lowest.
-    fn particle(&self, point: Vec3) -> Option<u32> {
-        let grid = self.grid.as_ref()?;
-        let mut reach = self.reach;
-        // A surface is never far from what makes it.
-        for _ in 0..8 {
-            let mut nearest: Option<(f32, u32)> = None;
-            grid.visit_near(point, reach, |slot| {
-                let distance = grid.center(slot).distance(point);
-                let index = self.cloud.indices[grid.index(slot) as usize];
-                if distance <= reach && nearest.is_none_or(|found| (distance, index) < found) {
-                    nearest = Some((distance, index));
-                }
-            });
-            if let Some((_, index)) = nearest {
-                return Some(index);
-            }
-            reach *= 2.0;
-        }
-        None
     }
 }
 

@@ -5,19 +5,20 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
-use motes_grid::Visibility;
 use motes_scene::{Bounds, Renderer, Resolved, Scene};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 use rayon::prelude::*;
 
+use crate::cut::Visible;
 use crate::density::{Cast, Fields};
 use crate::entries::Entries;
-use crate::liquid::{Boundaries, Liquid, Matter};
+use crate::liquid::{Boundaries, Liquid, Matter, Opened};
 use crate::memo::{Memo, Same};
+use crate::nearest::Nearest;
 use crate::scenery::Others;
 use crate::stats::Stats;
-use crate::system::{Cuts, Loaded};
+use crate::system::Loaded;
 use crate::{Error, Result, Watch};
 
 /// What is drawn.
@@ -39,7 +40,7 @@ pub(crate) struct Kept {
     renderer: motes_spheres::Renderer,
     boundaries: Boundaries,
     fields: Fields,
-    media: Memo<Same<Cuts>, Vec<(usize, Vec<Visibility>)>>,
+    media: Memo<Same<Visible>, Vec<(usize, Arc<Visible>)>>,
 }
 
 impl Default for Kept {
@@ -92,7 +93,7 @@ impl Drawing<'_> {
         let types = match scene.surface.media {
             motes_scene::surface::Media::One => Arc::default(),
             motes_scene::surface::Media::Types => {
-                self.kept.media.get(Same(system.cuts.clone()), || system.visible_by_type())?
+                self.kept.media.get(Same(system.visible.clone()), || system.visible_by_type())?
             }
         };
         if types.len() > MOST_MEDIA {
@@ -101,12 +102,21 @@ impl Drawing<'_> {
                 types.len()
             )));
         }
-        let media = types.iter().map(|(kind, of)| (*kind, matter.only(system, (*kind, of))));
-        let media: Vec<_> = media.collect();
+        let media: Vec<_> = types.iter().map(|(i, of)| (*i, matter.only(system, of))).collect();
         let media = &media[..];
-        let boundaries = Some(&self.kept.boundaries);
-        let liquid =
-            Liquid { scene, matter, media, resolved, bounds, origin, level, others, boundaries };
+        let nearest = system.clip().map(|_| Nearest::new(system));
+        let liquid = Liquid {
+            scene,
+            matter,
+            media,
+            resolved,
+            bounds,
+            origin,
+            level,
+            others,
+            opened: Opened::of(system, &nearest),
+            boundaries: Some(&self.kept.boundaries),
+        };
         liquid.draw(layers, (stats, watch))
     }
 
@@ -117,7 +127,8 @@ impl Drawing<'_> {
         let entries = Entries::new(loaded, &self.scene.light);
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
-        let (systems, casters) = (&entries.spheres, &entries.casters);
+        let systems = &entries.spheres;
+        let casters = &entries.casters;
         let view = View { rays: &rays, systems, paint: &entries, lights: &lights, casters };
         let image = &self.scene.image;
         let settings = Settings {

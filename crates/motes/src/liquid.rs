@@ -9,24 +9,32 @@ use std::time::Instant;
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
-use motes_grid::Visibility;
+use motes_grid::{Clip, Visibility};
 use motes_scene::surface::{self, Culling, Filtering};
 use motes_scene::{Beyond, Bounds, CameraView, Environment, Lights, Resolved, Scene};
+use motes_spheres::Cap;
 use motes_surface::{
     Around, Bits, Boundary, Cull, Filter, Input, Marks, Medium, Mode, Occlusion, Optics, Paint,
     Params, Particles, Representation, Shadow, Smoothing, Spans, Spray, Surfaces, View, compress,
     connect, filter, normals, shade_finer, splat, voxelize,
 };
 
+use crate::caps::Caps;
+use crate::cut::Visible;
 use crate::environment::{FLOOR_FILL, WATER, environment};
 use crate::memo::{Memo, Same};
+use crate::nearest::Nearest;
 use crate::paint;
 use crate::scenery::{Others, Scenery};
 use crate::session::milliseconds;
 use crate::stats::Stats;
-use crate::system::{Cuts, Loaded};
+use crate::system::Loaded;
 use crate::{Error, Result, Watch};
 
+/// Up to so many particles, balls are fitted to the surface by themselves: of more, each is but a few pixels wide.
+const FIT_AUTO: usize = 500_000;
+/// The least edge of cells to fit by, in radii of the balls.
+const FIT_CELL: f64 = 1.8;
 /// Rows of the light's own view.
 const SHADOW_ROWS: u32 = 1024;
 
@@ -34,8 +42,8 @@ const SHADOW_ROWS: u32 = 1024;
 #[derive(Clone, Copy)]
 pub(crate) struct Matter<'a> {
     pub particles: Particles<'a>,
-    /// What they are of, and which of its types if not all; none where they are not of a system's grids.
-    pub identity: Option<(&'a Arc<Cuts>, Option<usize>)>,
+    /// What they are of; none where they are not of a system's grids.
+    pub identity: Option<&'a Arc<Visible>>,
     /// How many of them are visible.
     pub visible: usize,
     pub mean_radius: f64,
@@ -56,7 +64,7 @@ impl<'a> Matter<'a> {
         let greatest = grids.iter().map(|g| g.greatest_radius).fold(0.0, f32::max);
         Self {
             particles: Particles::Grids(grids, system.visible()),
-            identity: Some((&system.cuts, None)),
+            identity: Some(&system.visible),
             visible: system.count_visible(),
             mean_radius: sum / count.max(1) as f64,
             greatest_radius: f64::from(greatest),
@@ -68,10 +76,10 @@ impl<'a> Matter<'a> {
 
 impl<'a> Matter<'a> {
     /// The same of fewer particles of its system.
-    pub fn only(self, system: &'a Loaded, (kind, visible): (usize, &'a [Visibility])) -> Self {
-        let particles = Particles::Grids(&system.classes.grids, visible);
-        let identity = Some((&system.cuts, Some(kind)));
-        let visible = visible.iter().map(Visibility::visible).sum();
+    pub fn only(self, system: &'a Loaded, visible: &'a Arc<Visible>) -> Self {
+        let particles = Particles::Grids(&system.classes.grids, visible.all());
+        let identity = Some(visible);
+        let visible = visible.all().iter().map(Visibility::visible).sum();
         Self { particles, identity, visible, ..self }
     }
 }
@@ -84,7 +92,7 @@ pub(crate) struct Setting {
 }
 
 /// Boundaries of liquids from one picture to the next, by what is visible and how spans are made.
-pub(crate) type Boundaries = Memo<(Same<Cuts>, Option<usize>, Params, f64), Boundary>;
+pub(crate) type Boundaries = Memo<(Same<Visible>, Params, f64), Boundary>;
 
 /// What a liquid is drawn from.
 #[derive(Clone, Copy)]
@@ -101,7 +109,25 @@ pub(crate) struct Liquid<'a> {
     pub level: Level,
     /// What stands before it and in it.
     pub others: Option<Others<'a>>,
+    /// Where it is cut open.
+    pub opened: Option<Opened<'a>>,
     pub boundaries: Option<&'a Boundaries>,
+}
+
+/// Cuts of a liquid, and where its particles are.
+#[derive(Clone, Copy)]
+pub(crate) struct Opened<'a> {
+    clip: &'a Clip,
+    nearest: &'a Nearest<'a>,
+    caps: &'a Caps,
+}
+
+impl<'a> Opened<'a> {
+    /// The cuts of a liquid, if there are any.
+    pub fn of(system: &'a Loaded, nearest: &'a Option<Nearest<'a>>) -> Option<Self> {
+        let cuts = system.clip().zip(nearest.as_ref());
+        cuts.map(|(clip, nearest)| Self { clip, nearest, caps: &system.caps })
+    }
 }
 
 impl Liquid<'_> {
@@ -121,7 +147,7 @@ impl Liquid<'_> {
             false => Err(Error::Cancelled),
         };
         go_on(0)?;
-        let params = self.params(layers || self.painted());
+        let params = self.params(layers || self.painted() || self.opened.is_some());
         let boundary = self.boundary(&params, stats);
         go_on(1)?;
         let optics = self.optics(bounds);
@@ -167,12 +193,11 @@ impl Liquid<'_> {
         let ball = self.scene.surface.ball;
         let input = Input { particles: self.matter.particles, radius_scale: ball as f32 };
         let extract = || Ok(Boundary::extract(&input, params, self.level));
-        let boundary: std::result::Result<_, Infallible> = match (self.boundaries, self.matter.identity) {
-            (Some(kept), Some((of, kind))) => {
-                kept.get((Same(of.clone()), kind, *params, ball), extract)
-            }
-            _ => extract().map(Arc::new),
-        };
+        let boundary: std::result::Result<_, Infallible> =
+            match (self.boundaries, self.matter.identity) {
+                (Some(kept), Some(of)) => kept.get((Same(of.clone()), *params, ball), extract),
+                _ => extract().map(Arc::new),
+            };
         let Ok(boundary) = boundary;
         stats.ms.insert("boundary", milliseconds(start));
         let counts = boundary.counts;
@@ -219,7 +244,7 @@ impl Liquid<'_> {
             shown: self.scene.surface.environment != "none" && !self.scene.image.transparent,
             shadow: shadow.as_ref(),
             occlusion: occlusion.as_ref(),
-            paint: self.painted().then_some(self as &dyn Paint),
+            paint: (self.painted() || self.opened.is_some()).then_some(self as &dyn Paint),
             color: Vec3::from(self.scene.surface.color.linear()),
         };
         let media = media.iter().map(|(surfaces, ior)| Medium { surfaces, ior: *ior });
@@ -267,6 +292,11 @@ impl Liquid<'_> {
     /// How spans are made; with `ids`, surfaces know their particles.
     pub fn params(&self, ids: bool) -> Params {
         let s = &self.scene.surface;
+        let fit = match s.fit {
+            surface::Fit::Auto => self.matter.visible <= FIT_AUTO,
+            surface::Fit::On => true,
+            surface::Fit::Off => false,
+        };
         Params {
             gap: s.gap.unwrap_or(5.0 * self.radius()) as f32,
             spans: s.spans,
@@ -275,7 +305,9 @@ impl Liquid<'_> {
                 Culling::Count => Cull::Count(s.cull_count),
                 Culling::Off => Cull::Off,
             },
-            cell: s.cull_cell as f32,
+            // What is fitted to the surface looks at all neighbours within a cell.
+            cell: s.cull_cell.max(if fit { FIT_CELL } else { 0.0 }) as f32,
+            fit,
             spray: match s.spray {
                 surface::Spray::Keep if s.drop == s.ball => Spray::Liquid,
                 surface::Spray::Keep => Spray::Drops((s.drop / s.ball) as f32),
@@ -363,7 +395,12 @@ impl Liquid<'_> {
             stats.counts.insert("layers", made.layers as u64);
             stats.counts.insert("layers_coarsened", u64::from(made.coarsened));
         }
-        let surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
+        let mut surfaces = Surfaces::of_spans(spans, view, (nearness, normals));
+        if let Some(Opened { clip, nearest, .. }) = self.opened {
+            let particle = |point| nearest.particle(point).unwrap_or(Spans::NO_PARTICLE);
+            surfaces = surfaces.cut(clip, &particle);
+            timed.lap("cut");
+        }
         stats.bytes.insert("surfaces", surfaces.bytes());
         surfaces
     }
@@ -392,7 +429,10 @@ impl Liquid<'_> {
         let light = CameraView::new(&camera, framing, size);
         let view = fitted(&light, size, (bounds, self.ball()), self.origin);
         let params = Params { ids: false, ..self.params(false) };
-        let (spans, _) = voxelize(boundary, &view, &params, self.level);
+        let (mut spans, _) = voxelize(boundary, &view, &params, self.level);
+        if let Some(Opened { clip, .. }) = self.opened {
+            spans = spans.cut(clip, &view);
+        }
         let mean = optics.absorption.element_sum() / 3.0;
         // What is opaque lets nothing through that is thicker than a ball.
         let extinction = match optics.mode {
@@ -423,8 +463,17 @@ impl<'a> Laps<'a> {
 }
 
 impl Paint for Liquid<'_> {
-    fn color(&self, particle: u32) -> Vec3 {
-        self.matter.paint.color(particle)
+    fn color(&self, particle: u32) -> Option<Vec3> {
+        self.painted().then(|| self.matter.paint.color(particle))
+    }
+
+    fn cap(&self, owner: u16, point: Vec3, particle: Option<u32>) -> Option<Vec3> {
+        let particle = particle?;
+        let outside = || match self.painted() {
+            true => self.matter.paint.color(particle),
+            false => Vec3::from(self.scene.surface.color.linear()),
+        };
+        self.opened?.caps.color(particle, Cap { owner, point }, outside)
     }
 }
 

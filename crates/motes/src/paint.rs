@@ -6,13 +6,15 @@ use glam::Vec3;
 use motes_particles::expression::Property;
 use motes_particles::read::names;
 use motes_particles::{Column, Particles, Values};
-use motes_scene::{ColorBy, ColorMap, Coloring, Component, Element, System, nearest};
+use motes_scene::{
+    Color, ColorBy, ColorMap, Coloring, Component, Element, System, nearest, residue_color,
+};
 
 use crate::opacity::Opacity;
 use crate::{Error, Result};
 
 /// What `color.by` can be besides the name of a property.
-const WORDS: &[&str] = &["auto", "uniform", "element", "type", "chain"];
+const WORDS: &[&str] = &["auto", "uniform", "element", "type", "chain", "residue"];
 
 /// The colours of one system's particles.
 #[derive(Clone, Debug)]
@@ -110,12 +112,18 @@ impl Paint {
             ColorBy::Uniform => uniform(coloring),
             ColorBy::Element | ColorBy::Type => {
                 let types = category_column(particles, &[names::PARTICLE_TYPE])?;
-                categories(types, coloring, coloring.by == ColorBy::Element)
+                let known = if coloring.by == ColorBy::Element { element } else { nothing };
+                categories(types, coloring, known)
             }
             ColorBy::Chain => {
                 let of = [names::CHAIN, names::MOLECULE_IDENTIFIER];
-                categories(category_column(particles, &of)?, coloring, false)
+                categories(category_column(particles, &of)?, coloring, nothing)
             }
+            ColorBy::Residue => categories(
+                category_column(particles, &[names::RESIDUE_NAME])?,
+                coloring,
+                residue_color,
+            ),
             ColorBy::Property(name) => by_property(particles, coloring, name, range)?,
         };
         let own_color = match how {
@@ -176,7 +184,8 @@ fn automatic(particles: &Particles, coloring: &Coloring) -> (How, Meaning) {
         Some(types) => {
             let elements = matches!(&types.values, Values::Names { names, .. }
                 if names.iter().all(|n| Element::by_symbol(n).is_some()));
-            let (how, meaning) = categories(types, coloring, elements);
+            let known = if elements { element } else { nothing };
+            let (how, meaning) = categories(types, coloring, known);
             match &meaning {
                 Meaning::Categories { entries, .. } if entries.len() == 1 && !elements => {
                     uniform(coloring)
@@ -202,12 +211,22 @@ pub(crate) fn category_column<'a>(particles: &'a Particles, of: &[&str]) -> Resu
     })
 }
 
-/// Distinct colours for names or whole numbers.
-fn categories(column: &Column, coloring: &Coloring, elements: bool) -> (How, Meaning) {
+/// The colours that everybody knows things of a name by.
+type Known = fn(&str) -> Option<Color>;
+
+fn nothing(_: &str) -> Option<Color> {
+    None
+}
+
+fn element(name: &str) -> Option<Color> {
+    Element::by_symbol(name).map(|e| e.color)
+}
+
+/// Distinct colours for names or whole numbers: those that are `known`, else the palette's.
+fn categories(column: &Column, coloring: &Coloring, known: Known) -> (How, Meaning) {
     let (kinds, names) = kinds_of(column);
-    let color = |(i, name): (usize, &String)| {
-        Vec3::from(color_of((i, name), coloring, elements).linear())
-    };
+    let color =
+        |(i, name): (usize, &String)| Vec3::from(color_of((i, name), coloring, known).linear());
     let colors: Vec<Vec3> = names.iter().enumerate().map(color).collect();
     let entries = names.into_iter().zip(colors.iter().copied()).collect();
     let meaning = Meaning::Categories { title: column.name.clone(), entries };
@@ -217,20 +236,19 @@ fn categories(column: &Column, coloring: &Coloring, elements: bool) -> (How, Mea
 /// The colour of each type, where types have colours.
 pub(crate) fn type_colors(types: &Column, coloring: &Coloring) -> Vec<motes_scene::Color> {
     let (_, names) = kinds_of(types);
-    let known = names.iter().all(|name| Element::by_symbol(name).is_some());
-    let elements = match coloring.by {
-        ColorBy::Element => true,
-        ColorBy::Auto => matches!(types.values, Values::Names { .. }) && known,
-        _ => false,
+    let all = names.iter().all(|name| Element::by_symbol(name).is_some());
+    let known: Known = match coloring.by {
+        ColorBy::Element => element,
+        ColorBy::Auto if matches!(types.values, Values::Names { .. }) && all => element,
+        _ => nothing,
     };
-    names.iter().enumerate().map(|(i, name)| color_of((i, name), coloring, elements)).collect()
+    names.iter().enumerate().map(|(i, name)| color_of((i, name), coloring, known)).collect()
 }
 
 /// The colour of the `i`-th kind, called `name`.
-fn color_of((i, name): (usize, &str), coloring: &Coloring, elements: bool) -> motes_scene::Color {
+fn color_of((i, name): (usize, &str), coloring: &Coloring, known: Known) -> Color {
     let given = coloring.colors.get(name).copied();
-    let element = || Element::by_symbol(name).filter(|_| elements).map(|e| e.color);
-    given.or_else(element).unwrap_or_else(|| coloring.palette.color(i))
+    given.or_else(|| known(name)).unwrap_or_else(|| coloring.palette.color(i))
 }
 
 /// The kind of each particle, counted from 0, and the kinds' names: names in order of appearance,
@@ -272,7 +290,7 @@ fn by_property(
         && let column = &particles.columns[index]
         && let Values::Names { .. } = column.values
     {
-        return Ok(categories(column, coloring, false));
+        return Ok(categories(column, coloring, nothing));
     }
     let map = ColorMap::by_name(&coloring.map)?;
     let map = if coloring.reverse { map.reversed() } else { map };

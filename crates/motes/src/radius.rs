@@ -1,4 +1,6 @@
-//! How large each particle is: the file's radius, else the element's, else half the spacing.
+//! How large each particle is: the file's radius, else the element's, else half the spacing. The spacing of spheres is
+//! that of nearest neighbours; that of a liquid, whose particles may lie in pairs and strings, is the edge of the cube that a
+//! particle has for itself.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -6,7 +8,7 @@ use std::collections::HashMap;
 use motes_grid::{Grid, Radii, RadiusClasses};
 use motes_particles::read::names;
 use motes_particles::{Column, Particles, Radius, Values};
-use motes_scene::{Element, System};
+use motes_scene::{Element, Renderer, Scene, System};
 
 /// The radius of particles that have no neighbour to measure by.
 const LONE_RADIUS: f32 = 0.5;
@@ -18,15 +20,35 @@ pub(crate) enum Rule {
     Uniform(f32),
     /// One radius each, in the file's order.
     Each(Vec<f32>),
-    /// Half the median distance to the nearest neighbour: known once there is a grid.
-    HalfSpacing,
+    /// Half the spacing: known once there is a grid.
+    HalfSpacing(Spacing),
     /// A radius for some; for the others as above.
-    SomeElseHalfSpacing(Vec<Option<f32>>),
+    SomeElseHalfSpacing(Vec<Option<f32>>, Spacing),
+}
+
+/// What is taken for the spacing of particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spacing {
+    /// The median distance to the nearest neighbour.
+    Nearest,
+    /// [`Grid::share_edge`].
+    Share,
+}
+
+impl Spacing {
+    /// That of the system at place `system`: the first one that is visible is the liquid, if anything is one.
+    pub fn of(scene: &Scene, system: usize) -> Self {
+        let first = scene.system.iter().position(|s| s.visible);
+        match scene.renderer {
+            Renderer::Surface | Renderer::Density if first == Some(system) => Self::Share,
+            _ => Self::Nearest,
+        }
+    }
 }
 
 /// The rule for `particles`: `radius` of the scene; else, per type, `radii` of the scene; else the
 /// file's; else the element's; else half the spacing.
-pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
+pub(crate) fn rule(particles: &Particles, system: &System, spacing: Spacing) -> Rule {
     if let Some(radius) = system.radius {
         return Rule::Uniform(radius as f32);
     }
@@ -38,7 +60,9 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
     let rest = match &particles.radius {
         Radius::Uniform(r) => Rule::Uniform(*r),
         Radius::Each(radii) => Rule::Each(radii.clone()),
-        Radius::Unknown => types.and_then(of_elements).map_or(Rule::HalfSpacing, Rule::Each),
+        Radius::Unknown => {
+            types.and_then(of_elements).map_or(Rule::HalfSpacing(spacing), Rule::Each)
+        }
     };
     let Some(given) = given else { return rest };
     let other = |i: usize| match &rest {
@@ -50,7 +74,7 @@ pub(crate) fn rule(particles: &Particles, system: &System) -> Rule {
         given.iter().enumerate().map(|(i, r)| r.or_else(|| other(i))).collect();
     match radii.iter().copied().collect() {
         Some(all) => Rule::Each(all),
-        None => Rule::SomeElseHalfSpacing(radii),
+        None => Rule::SomeElseHalfSpacing(radii, spacing),
     }
 }
 
@@ -111,31 +135,36 @@ pub(crate) fn classes(
             radii.iter_mut().for_each(|r| *r *= scale);
             spare.rebuild(positions, Radii::Each(&radii), params)
         }
-        Rule::HalfSpacing => {
+        Rule::HalfSpacing(spacing) => {
             let count = positions.len();
             let spare = spare.grids.into_iter().next().unwrap_or_else(Grid::empty);
-            let (mut grid, radius) = half_spacing(spare, positions, params);
+            let (mut grid, radius) = half_spacing((spare, spacing), positions, params);
             grid.set_radius(radius * scale);
             let left_out = count - grid.len();
             let grids = if grid.is_empty() { vec![] } else { vec![grid] };
             RadiusClasses { grids, left_out }
         }
-        Rule::SomeElseHalfSpacing(radii) => {
-            let (_, other) = half_spacing(Grid::empty(), Cow::Borrowed(&positions), params);
+        Rule::SomeElseHalfSpacing(radii, spacing) => {
+            let (_, other) =
+                half_spacing((Grid::empty(), spacing), Cow::Borrowed(&positions), params);
             let radii = radii.into_iter().map(|r| r.unwrap_or(other)).collect();
             classes(spare, positions, Rule::Each(radii), scale, params)
         }
     }
 }
 
-/// A grid over the positions, and half the median distance between neighbours in it.
+/// A grid over the positions, and half the spacing in it.
 fn half_spacing(
-    spare: Grid,
+    (spare, spacing): (Grid, Spacing),
     positions: Cow<'_, [[f32; 3]]>,
     params: motes_grid::Params,
 ) -> (Grid, f32) {
     // The least radius there is lets the grid be as fine as λ says.
     let grid = spare.rebuild(positions, Radii::Uniform(f32::MIN_POSITIVE), None, params);
-    let radius = grid.median_spacing().map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
+    let spacing = match spacing {
+        Spacing::Nearest => grid.median_spacing(),
+        Spacing::Share => grid.share_edge(),
+    };
+    let radius = spacing.map_or(LONE_RADIUS, |spacing| 0.5 * spacing);
     (grid, radius)
 }

@@ -14,6 +14,7 @@ use motes_scene::{
 
 use crate::ahead::{Ahead, All};
 use crate::annotate::{Annotated, annotations};
+use crate::cut::Visible;
 use crate::drawing::{Drawing, Kept};
 use crate::memo::Same;
 use crate::opacity::ALPHA;
@@ -21,7 +22,7 @@ use crate::paint::{Meaning, find_property};
 use crate::picture::Picture;
 use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
-use crate::system::{Cuts, Loaded};
+use crate::system::{Loaded, asks_for_ages};
 use crate::{Error, Result};
 
 /// Whether a picture carries depth, normal, id and system besides colour.
@@ -140,8 +141,11 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let series = scene.system.iter().map(|s| Ok(Arc::new(Mutex::new(open(&s.source)?))));
-        let series = series.collect::<Result<Vec<_>>>()?;
+        let mut series =
+            scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let aged = series.iter_mut().zip(&scene.system).filter(|(_, s)| asks_for_ages(s));
+        aged.for_each(|(series, _)| series.add_ages());
+        let series = series.into_iter().map(|series| Arc::new(Mutex::new(series))).collect();
         Ok(Self { pool, ..Self::of(scene, series) })
     }
 
@@ -177,9 +181,16 @@ impl Session {
         scene.check()?;
         let sources = |s: &Scene| s.system.iter().map(|s| s.source.clone()).collect::<Vec<_>>();
         if sources(&scene) != sources(&self.scene) {
-            return Err(Error::Usage("the scene has other sources than those that are open".into()));
+            return Err(Error::Usage(
+                "the scene has other sources than those that are open".into(),
+            ));
         }
-        self.scene = scene;
+        let before = std::mem::replace(&mut self.scene, scene);
+        for (i, system) in self.scene.system.iter().enumerate() {
+            if asks_for_ages(system) && !asks_for_ages(&before.system[i]) {
+                lock(&self.series[i]).add_ages();
+            }
+        }
         Ok(())
     }
 
@@ -272,9 +283,8 @@ impl Session {
         let drawn = self.draw((shot, after), layers, watch)?;
         let mut stats = drawn.stats;
         let start = Instant::now();
-        let annotated =
-            Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
-        let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated);
+        let annotated = Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
+        let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         stats.hash = format!("{:016x}", drawn.raw.hash());
         stats.peak_memory = peak_memory_bytes();
@@ -300,7 +310,7 @@ impl Session {
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
         let annotated = Annotated { systems: &loaded, frame, film: self.film };
-        let shown = self.finish(raw, &resolved, &annotated);
+        let shown = self.finish(raw, &resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, origin } })
     }
@@ -340,10 +350,10 @@ impl Session {
 
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
-        // Lines in space are hidden by depth.
+        // Lines in space are hidden by depth, and cues come from all layers.
         let lines = loaded.iter().any(|l| l.sim_box.is_some());
         let quick = after == After::Moves && self.scene.renderer != Renderer::Spheres;
-        let layers = layers == Layers::Yes || (lines && !quick);
+        let layers = layers == Layers::Yes || scene.cue.any() || (lines && !quick);
         let start = Instant::now();
         let drawing = Drawing {
             scene: &self.scene,
@@ -528,8 +538,8 @@ impl Session {
         Ok(())
     }
 
-    /// Tone, background and annotations.
-    fn finish(&self, raw: Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Frame {
+    /// Tone, cues, background and annotations.
+    fn finish(&self, raw: Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Result<Frame> {
         let image = &self.scene.image;
         let mut shown = raw;
         let curve = match image.tone {
@@ -537,6 +547,7 @@ impl Session {
             motes_scene::Tone::Filmic => Curve::Filmic,
         };
         Tone { exposure: image.exposure as f32, curve }.apply(&mut shown);
+        crate::cues::draw(&self.scene.cue, resolved, annotated.systems, &mut shown)?;
         let background = match (image.transparent, image.background_bottom) {
             (true, _) => Background::Transparent,
             (false, None) => Background::Solid(resolved.background.top.to_array()),
@@ -547,7 +558,7 @@ impl Session {
         };
         background.put_behind(&mut shown);
         annotations(&self.scene, resolved, annotated).draw(&mut shown);
-        shown
+        Ok(shown)
     }
 }
 
@@ -631,11 +642,11 @@ impl Reading {
 
 /// What boxes are made around.
 #[derive(PartialEq)]
-struct Framed(Same<Cuts>, Option<SimulationBox>, DVec3);
+struct Framed(Same<Visible>, Option<SimulationBox>, DVec3);
 
 impl Framed {
     fn of(loaded: &Loaded, origin: DVec3) -> Self {
-        Self(Same(loaded.cuts.clone()), loaded.sim_box, origin)
+        Self(Same(loaded.visible.clone()), loaded.sim_box, origin)
     }
 }
 
@@ -653,7 +664,9 @@ impl RangeKey {
 
 /// Makes a path absolute, so that a picture can be drawn again from any directory.
 pub(crate) fn make_absolute(source: &mut String) {
-    if !crate::open::is_made(source) && let Ok(path) = std::path::absolute(&*source) {
+    if !crate::open::is_made(source)
+        && let Ok(path) = std::path::absolute(&*source)
+    {
         *source = path.to_string_lossy().into_owned();
     }
 }
@@ -667,6 +680,7 @@ pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
     let by = match &system.color.by {
         ColorBy::Auto => vec![names::COLOR, ALPHA],
         ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
+        ColorBy::Residue => vec![names::RESIDUE_NAME],
         ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
         ColorBy::Property(_) => return Wanted::All,
     };
@@ -720,5 +734,5 @@ fn count(stats: &mut Stats, loaded: &[Loaded]) {
     stats.particles.insert("left_out", sum(&|l| l.classes.left_out));
     stats.bytes.insert("data", grids(&|g| g.data_bytes()));
     stats.bytes.insert("grid", grids(&|g| g.structure_bytes()));
-    stats.bytes.insert("visibility", sum(&Loaded::visibility_bytes));
+    stats.bytes.insert("visibility", sum(&|l| l.visible.bytes()));
 }

@@ -1,7 +1,7 @@
 //! From a frame's particles to what can be drawn of a system, stage by stage. Each is redone only when
 //! what it depends on has changed:
 //!
-//! > particles ──radii──► grids ──where, filters──► visible ──sections──► cuts
+//! > particles ──radii──► grids ──where, filters──► visible
 //! > particles ──color, opacity──► paint
 
 use std::collections::BTreeMap;
@@ -10,13 +10,15 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, RadiusClasses, Resolution};
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Coloring, Scene, Section, Show, System};
+use motes_scene::{Bounds, Coloring, Scene, Section, Show, System};
 
 use crate::annotate::box_shown;
 use crate::caps::Caps;
+use crate::cut::{Body, Keep, Visible};
 use crate::memo::Same;
 use crate::paint::Paint;
-use crate::system::{Cuts, Loaded, asks_for_positions, diagonal, is_liquid};
+use crate::radius::Spacing;
+use crate::system::{Loaded, asks_for_positions, boxes, visibility};
 use crate::{Result, radius};
 
 /// The stages of one system.
@@ -29,8 +31,8 @@ pub(crate) struct Stages {
     /// Whether the grids no longer know which of their particles coincide.
     forgotten: bool,
     paint: Option<(PaintKey, Arc<Paint>)>,
-    cuts: Option<(VisibleKey, CutKey, Arc<Cuts>)>,
-    caps: Option<(Same<Cuts>, Vec<Section>, Arc<Caps>)>,
+    visible: Option<(VisibleKey, CutKey, Arc<Visible>)>,
+    caps: Option<((Vec<Section>, Coloring, Same<Visible>), Arc<Caps>)>,
 }
 
 /// What grids depend on besides particles.
@@ -41,6 +43,8 @@ struct GridKey {
     radii: BTreeMap<String, f64>,
     lambda: f64,
     block: u32,
+    /// What is measured where radii are not known.
+    spacing: Spacing,
     /// From the particles' own origin to the scene's.
     shift: DVec3,
 }
@@ -57,19 +61,19 @@ struct PaintKey {
 #[derive(PartialEq)]
 struct VisibleKey(System);
 
+/// What cuts depend on besides what is visible without them.
+#[derive(PartialEq)]
+struct CutKey {
+    sections: Vec<Section>,
+    liquid: bool,
+    origin: DVec3,
+}
+
 impl VisibleKey {
     fn of(system: &System) -> Self {
         let (color, name) = (Coloring::default(), String::new());
         Self(System { color, name, opacity: 1.0, ..system.clone() })
     }
-}
-
-/// What cuts depend on besides what is visible.
-#[derive(Clone, PartialEq)]
-struct CutKey {
-    sections: Vec<Section>,
-    origin: DVec3,
-    liquid: bool,
 }
 
 impl Stages {
@@ -92,24 +96,31 @@ impl Stages {
             radii: system.radii.clone(),
             lambda: scene.spheres.lambda,
             block: scene.spheres.block,
+            spacing: Spacing::of(scene, number as usize),
             shift: DVec3::from_array(particles.origin) - origin,
         };
         self.build(&key, spare, (&mut particles, (scene, system)));
         self.particles = Some(particles.clone());
-        let paint = self.painted(&particles, PaintKey {
-            color: system.color.clone(),
-            opacity: system.opacity,
-            range,
-        }, system)?;
+        let paint = self.painted(
+            &particles,
+            PaintKey { color: system.color.clone(), opacity: system.opacity, range },
+            system,
+        )?;
         self.forget_coinciding(!paint.opacity.is_opaque(), &key, (&mut particles, (scene, system)));
         let Some((_, classes)) = &self.grids else { return Err(crate::Error::Cancelled) };
         let classes = classes.clone();
-        let number = usize::from(number);
-        let cuts = self.cut((&particles, &classes), (scene, number), origin)?;
-        let caps = self.capped((&particles, &classes), &cuts, (scene, number))?;
+        let number_of = usize::from(number);
+        let body = Body {
+            particles: &particles,
+            classes: &classes,
+            number: number_of,
+            origin,
+            liquid: Spacing::of(scene, number_of) == Spacing::Share,
+        };
+        let visible = self.seen(body, scene)?;
         let sim_box = self.boxed(&particles, scene.overlay.r#box);
-        let number = number as u16;
-        Ok(Loaded { number, particles, sim_box, classes, cuts, paint, caps })
+        let caps = self.capped((&particles, &classes), (scene, number_of), (&visible, origin))?;
+        Ok(Loaded { number, particles, sim_box, classes, visible, paint, caps })
     }
 
     /// Forgets all but the memory of the grids: other particles come.
@@ -141,7 +152,7 @@ impl Stages {
             memory = spare(Some(grids));
         }
         self.particles = None;
-        let rule = radius::rule(particles, system);
+        let rule = radius::rule(particles, system, key.spacing);
         let params = Params {
             resolution: Resolution::CellsPerParticle(key.lambda as f32),
             block_cells: key.block,
@@ -160,7 +171,7 @@ impl Stages {
         }
         let classes = radius::classes(memory, positions, rule, key.scale as f32, params);
         self.grids = Some((key.clone(), Arc::new(classes)));
-        (self.forgotten, self.cuts) = (false, None);
+        (self.forgotten, self.visible) = (false, None);
     }
 
     fn painted(
@@ -197,52 +208,51 @@ impl Stages {
             self.build(key, RadiusClasses::default(), of);
             self.particles = had;
         }
-        if let Some(classes) = self.grids.as_mut().and_then(|(_, c)| Arc::get_mut(c)).filter(|_| forget) {
+        if let Some(classes) =
+            self.grids.as_mut().and_then(|(_, c)| Arc::get_mut(c)).filter(|_| forget)
+        {
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
-            (self.forgotten, self.cuts) = (true, None);
+            (self.forgotten, self.visible) = (true, None);
         }
     }
 
-    /// Cuts that move change what they must of those before.
-    fn cut(
-        &mut self,
-        (particles, classes): (&Particles, &RadiusClasses),
-        (scene, number): (&Scene, usize),
-        origin: DVec3,
-    ) -> Result<Arc<Cuts>> {
-        let visible = VisibleKey::of(&scene.system[number]);
-        let liquid = is_liquid(scene, number);
-        let key = CutKey { sections: scene.section.clone(), origin, liquid };
-        let mut cuts = match self.cuts.take() {
-            Some((had, had_key, cuts)) if had == visible => {
-                if had_key == key {
-                    self.cuts = Some((visible, key, cuts.clone()));
-                    return Ok(cuts);
-                }
-                cuts
-            }
-            _ => Arc::default(),
+    /// What is visible: where only sections have changed, by the blocks that these change alone.
+    fn seen(&mut self, body: Body<'_>, scene: &Scene) -> Result<Arc<Visible>> {
+        let system = &scene.system[body.number];
+        let sections = scene.sections_of(body.number).map(|(_, section)| section.clone());
+        let key = VisibleKey::of(system);
+        let cuts =
+            CutKey { sections: sections.collect(), liquid: body.liquid, origin: body.origin };
+        let had = self.visible.take().filter(|(had, ..)| *had == key);
+        let (had_cuts, mut visible) = match had {
+            Some((_, cuts, visible)) => (Some(cuts), visible),
+            None => (None, Arc::new(Visible::nothing())),
         };
-        Arc::make_mut(&mut cuts).set((particles, classes), (scene, number), origin)?;
-        self.cuts = Some((visible, key, cuts.clone()));
-        Ok(cuts)
+        if had_cuts.as_ref() != Some(&cuts) {
+            let base =
+                |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
+            Arc::make_mut(&mut visible).cut(body, scene, base)?;
+        }
+        self.visible = Some((key, cuts, visible.clone()));
+        Ok(visible)
     }
 
+    /// The colours of caps.
     fn capped(
         &mut self,
         (particles, classes): (&Arc<Particles>, &RadiusClasses),
-        cuts: &Arc<Cuts>,
         (scene, number): (&Scene, usize),
+        (visible, origin): (&Arc<Visible>, DVec3),
     ) -> Result<Arc<Caps>> {
-        let same = Same(cuts.clone());
+        let sections = scene.sections_of(number).map(|(_, section)| section.clone()).collect();
+        let key = (sections, scene.system[number].color.clone(), Same(visible.clone()));
         match &self.caps {
-            Some((of, sections, caps)) if *of == same && *sections == scene.section => {
-                Ok(caps.clone())
-            }
+            Some((had, caps)) if *had == key => Ok(caps.clone()),
             _ => {
-                let diagonal = diagonal(classes, cuts.visible());
+                let seen = boxes(classes, visible.all(), origin).into_iter().reduce(Bounds::union);
+                let diagonal = seen.map_or(1.0, |bounds| bounds.diagonal());
                 let caps = Arc::new(Caps::new((scene, number), particles, diagonal)?);
-                self.caps = Some((same, scene.section.clone(), caps.clone()));
+                self.caps = Some((key, caps.clone()));
                 Ok(caps)
             }
         }
@@ -288,7 +298,7 @@ mod tests {
     fn shared(a: &Loaded, b: &Loaded) -> [bool; 3] {
         [
             Arc::ptr_eq(&a.classes, &b.classes),
-            Arc::ptr_eq(&a.cuts, &b.cuts),
+            Arc::ptr_eq(&a.visible, &b.visible),
             Arc::ptr_eq(&a.paint, &b.paint),
         ]
     }
@@ -299,9 +309,7 @@ mod tests {
         let first = load(&mut of, &[]);
         for (assignments, expected) in [
             (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
-            (&["overlay.box=on"], [true, true, true]),
-            (&["renderer=surface"], [true, false, true]),
-            (&["section=[{}]"], [true, false, true]),
+            (&["overlay.box=on", "renderer=surface"], [true, true, true]),
             (&["system.where=Index < 100"], [true, false, true]),
             (&["system.filter=[{ min = 0.5 }]"], [true, false, true]),
             (&["system.color.by=Position"], [true, true, false]),
@@ -315,7 +323,10 @@ mod tests {
             assert_eq!(shared(&before, &after), expected, "{assignments:?}");
             let fresh = load(&mut (Stages::default(), of.1.clone()), assignments);
             assert_eq!(after.count_visible(), fresh.count_visible(), "{assignments:?}");
-            assert_eq!(after.classes.grids[0].greatest_radius, fresh.classes.grids[0].greatest_radius);
+            assert_eq!(
+                after.classes.grids[0].greatest_radius,
+                fresh.classes.grids[0].greatest_radius
+            );
         }
         of.1 = Arc::new(Particles::clone(&of.1));
         assert_eq!(shared(&first, &load(&mut of, &[])), [false; 3]);
@@ -330,7 +341,7 @@ mod tests {
             let grid = &loaded.classes.grids[0];
             let blocks = 0..grid.blocks.len() - 1;
             let of_block = |block| {
-                let seen = loaded.visible()[0].block(grid, block);
+                let seen = loaded.visible[0].block(grid, block);
                 grid.particles_of(block).enumerate().filter(|(i, _)| seen.shows(*i)).count()
             };
             blocks.map(of_block).sum::<usize>()

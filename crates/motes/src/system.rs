@@ -7,13 +7,13 @@ use motes_grid::{BlockRanges, Clip, Filter, Grid, RadiusClasses, Seen, Visibilit
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, CapColor, ColorBy, Renderer, Scene, System};
+use motes_scene::{Bounds, CapColor, ColorBy, Scene, System};
 use motes_spheres::Spheres;
 
 use crate::caps::Caps;
-use crate::cut::{Body, Keep, Pass};
+use crate::cut::{Keep, Visible};
 use crate::paint::{Paint, category_column, find_property, kinds_of};
-use crate::radius::Rule;
+use crate::radius::{Rule, Spacing};
 use crate::{Error, Result, radius};
 
 /// A system ready to be drawn; [`crate::stages::Stages`] makes it.
@@ -25,112 +25,19 @@ pub(crate) struct Loaded {
     /// The simulation box, where it is shown.
     pub sim_box: Option<SimulationBox>,
     pub classes: Arc<RadiusClasses>,
-    pub cuts: Arc<Cuts>,
+    pub visible: Arc<Visible>,
     pub paint: Arc<Paint>,
     /// The colours of what the sections lay open.
     pub caps: Arc<Caps>,
 }
 
-/// What filters and sections leave of a system.
-#[derive(Clone, Default)]
-pub(crate) struct Cuts {
-    /// Particles that the same sections cut.
-    passes: Vec<Pass>,
-    /// What is visible of all passes, where there are several.
-    merged: Vec<Visibility>,
-}
-
-impl Cuts {
-    /// Goes over to the sections of `scene`, in which nothing else has changed since these were made.
-    ///
-    /// # Errors
-    /// A section makes no sense here; or as [`visibility`].
-    pub fn set(
-        &mut self,
-        (particles, classes): (&Particles, &RadiusClasses),
-        (scene, number): (&Scene, usize),
-        origin: DVec3,
-    ) -> Result<()> {
-        let liquid = is_liquid(scene, number);
-        let body = Body { particles, classes, number, origin, liquid };
-        let system = &scene.system[number];
-        let visible = |keep: Option<Keep<'_>>| visibility(particles, classes, system, keep);
-        body.cut(scene, &mut self.passes, visible)?;
-        self.merged.clear();
-        if self.passes.len() > 1 {
-            let mut seen = vec![false; particles.len()];
-            self.passes.iter().for_each(|pass| mark(classes, pass.visible(), &mut seen));
-            let keep = |i: u32| seen[i as usize];
-            let of = |grid| Visibility::where_all(grid, &[], Some(&keep));
-            self.merged = classes.grids.iter().map(of).collect();
-        }
-        Ok(())
-    }
-
-    /// What is visible, grid by grid.
-    pub fn visible(&self) -> &[Visibility] {
-        match &self.passes[..] {
-            [pass] => pass.visible(),
-            _ => &self.merged,
-        }
-    }
-}
-
-/// Whether a system is seen as a liquid: the first that is visible.
-pub(crate) fn is_liquid(scene: &Scene, number: usize) -> bool {
-    let first = scene.system.iter().position(|system| system.visible);
-    scene.renderer != Renderer::Spheres && first == Some(number)
-}
-
-/// Sets `seen` of the particles that are `visible`.
-fn mark(classes: &RadiusClasses, visible: &[Visibility], seen: &mut [bool]) {
-    for (grid, visible) in classes.grids.iter().zip(visible) {
-        for block in 0..grid.blocks.len() - 1 {
-            let of = visible.block(grid, block);
-            for (i, slot) in grid.particles_of(block).enumerate() {
-                if of.shows(i) {
-                    seen[grid.index(slot) as usize] = true;
-                }
-            }
-        }
-    }
-}
-
 impl Loaded {
-    /// A system without cuts.
-    pub fn uncut(
-        (particles, paint): (Arc<Particles>, Paint),
-        (classes, visible): (RadiusClasses, Vec<Visibility>),
-    ) -> Self {
-        let cuts = Cuts { passes: vec![Pass::uncut(&classes, visible)], merged: Vec::new() };
-        let (classes, cuts, paint) = (Arc::new(classes), Arc::new(cuts), Arc::new(paint));
-        let (number, sim_box, caps) = (0, None, Arc::default());
-        Self { number, particles, sim_box, classes, cuts, paint, caps }
-    }
-
-    /// What is visible of the particles, grid by grid.
-    pub fn visible(&self) -> &[Visibility] {
-        self.cuts.visible()
-    }
-
-    /// The cuts of a liquid that its rays ask, if it has one; those of some types only are left out.
-    pub fn clip(&self) -> Option<&Clip> {
-        match &self.cuts.passes[..] {
-            [pass] => pass.clip(),
-            _ => None,
-        }
-    }
-
-    /// Bytes of what is visible.
-    pub fn visibility_bytes(&self) -> usize {
-        let merged = self.cuts.merged.iter().map(Visibility::bytes).sum::<usize>();
-        merged + self.cuts.passes.iter().map(Pass::bytes).sum::<usize>()
-    }
-
     /// Where radii were measured in this frame, makes them the scene's for all frames.
     pub fn hold_radius(&self, scene: &mut Scene) {
+        let spacing = Spacing::of(scene, self.number as usize);
         let Some(system) = scene.system.get_mut(self.number as usize) else { return };
-        let measured = matches!(radius::rule(&self.particles, system), Rule::HalfSpacing);
+        let rule = radius::rule(&self.particles, system, spacing);
+        let measured = matches!(rule, Rule::HalfSpacing(_));
         if let Some(grid) = self.classes.grids.first().filter(|_| measured) {
             system.radius = Some(f64::from(grid.radius_at(0)) / system.radius_scale);
         }
@@ -141,11 +48,21 @@ impl Loaded {
         self.visible().iter().map(Visibility::visible).sum()
     }
 
+    /// What is visible of the particles, grid by grid.
+    pub fn visible(&self) -> &[Visibility] {
+        self.visible.all()
+    }
+
+    /// The cuts of a liquid that its rays ask, if it has one.
+    pub fn clip(&self) -> Option<&Clip> {
+        self.visible.clip()
+    }
+
     /// What is visible of each type that has visible particles, by its place among all types.
     ///
     /// # Errors
     /// There are no types.
-    pub fn visible_by_type(&self) -> Result<Vec<(usize, Vec<Visibility>)>> {
+    pub fn visible_by_type(&self) -> Result<Vec<(usize, Arc<Visible>)>> {
         let (kinds, types) = kinds_of(category_column(&self.particles, &[names::PARTICLE_TYPE])?);
         let mut seen = vec![false; kinds.len()];
         mark(&self.classes, self.visible(), &mut seen);
@@ -153,15 +70,15 @@ impl Loaded {
         let of_type = |kind: usize| {
             let keep = |i: u32| seen[i as usize] && kinds[i as usize] as usize == kind;
             let all = grids.clone().map(|grid| Visibility::where_all(grid, &[], Some(&keep)));
-            (kind, all.collect::<Vec<_>>())
+            (kind, Arc::new(Visible::uncut(&self.classes, all.collect())))
         };
         let all = (0..types.len()).map(of_type);
-        Ok(all.filter(|(_, v)| v.iter().any(|v| v.visible() > 0)).collect())
+        Ok(all.filter(|(_, v)| v.all().iter().any(|v| v.visible() > 0)).collect())
     }
 
     /// What a tracer of spheres takes, pass by pass.
     pub fn spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
-        self.cuts.passes.iter().enumerate().map(|(i, pass)| Spheres {
+        self.visible.passes().iter().enumerate().map(|(i, pass)| Spheres {
             clip: pass.clip(),
             continues: i > 0,
             ..Spheres::new(&self.classes, pass.visible())
@@ -170,33 +87,40 @@ impl Loaded {
 
     /// As [`Loaded::spheres`], without cuts.
     pub fn uncut_spheres(&self) -> impl Iterator<Item = Spheres<'_>> {
-        self.cuts.passes.iter().map(|pass| Spheres::new(&self.classes, pass.all()))
+        self.visible.passes().iter().map(|pass| Spheres::new(&self.classes, pass.all()))
     }
 
     /// Boxes around what is visible, with radii, in world coordinates.
     pub fn boxes(&self, origin: DVec3) -> Vec<Bounds> {
-        let world = |(low, high): (Vec3, Vec3)| {
-            Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)
-        };
-        boxes(&self.classes, self.visible()).map(world).collect()
+        boxes(&self.classes, self.visible(), origin)
     }
 }
 
-/// Boxes around what is visible, with radii.
-fn boxes<'a>(
-    classes: &'a RadiusClasses,
-    visible: &'a [Visibility],
-) -> impl Iterator<Item = (Vec3, Vec3)> + 'a {
-    classes.grids.iter().zip(visible).flat_map(|(grid, visible)| {
+/// Boxes around what is `visible`, with radii, in world coordinates.
+pub(crate) fn boxes(classes: &RadiusClasses, visible: &[Visibility], origin: DVec3) -> Vec<Bounds> {
+    let mut boxes = Vec::new();
+    for (grid, visible) in classes.grids.iter().zip(visible) {
         let blocks = 0..grid.blocks.len() - 1;
-        blocks.filter_map(|block| block_bounds(grid, visible, block))
-    })
+        let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
+        boxes.extend(
+            seen.map(|(low, high)| Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)),
+        );
+    }
+    boxes
 }
 
-/// The diagonal of the box around what is visible; 1 if nothing is.
-pub(crate) fn diagonal(classes: &RadiusClasses, visible: &[Visibility]) -> f64 {
-    let all = boxes(classes, visible).map(|(low, high)| Bounds::new(low.as_dvec3(), high.as_dvec3()));
-    all.reduce(Bounds::union).map_or(1.0, |bounds| bounds.diagonal())
+/// Sets `seen`, by index, of the particles that are `visible`.
+pub(crate) fn mark(classes: &RadiusClasses, visible: &[Visibility], seen: &mut [bool]) {
+    for (grid, visible) in classes.grids.iter().zip(visible) {
+        for block in 0..grid.blocks.len() - 1 {
+            let of = visible.block(grid, block);
+            for (i, slot) in grid.particles_of(block).enumerate() {
+                if of.shows(i) {
+                    seen[grid.index(slot) as usize] = true;
+                }
+            }
+        }
+    }
 }
 
 /// What the filters and the expression of a system let through, of the particles that are `kept` if that is said.
@@ -244,8 +168,19 @@ pub(crate) fn visibility(
     Ok(classes.grids.iter().map(of_grid).collect())
 }
 
+/// Whether colours or what is visible go by the particles' ages.
+pub(crate) fn asks_for_ages(system: &System) -> bool {
+    let is_age = |name: &str| names::same(name, names::AGE);
+    let colored = matches!(&system.color.by, ColorBy::Property(name) if is_age(name));
+    let mut words = system.r#where.split(|c: char| !c.is_alphanumeric() && c != '_');
+    colored || words.any(is_age) || system.filter.iter().any(|filter| is_age(&filter.property))
+}
+
 /// Whether colours or what is visible go by the particles' positions.
-pub(crate) fn asks_for_positions(particles: &Particles, (scene, system): (&Scene, &System)) -> bool {
+pub(crate) fn asks_for_positions(
+    particles: &Particles,
+    (scene, system): (&Scene, &System),
+) -> bool {
     let by_position =
         |name: &str| matches!(Property::find(particles, name), Ok(Property::Position(_)));
     let color = match &system.color.by {

@@ -287,7 +287,9 @@ fn a_line_drawn_on_the_picture_is_a_plane_that_cuts_and_is_taken_back() {
     assert!((500..2900).contains(&visible), "{visible}");
     client.ask("undo", json!({})).unwrap();
     assert_eq!(client.settle().hash, whole.hash);
-    for (from, to) in [([0.5, 0.5], [0.5, 0.5]), ([0.0, 0.0], [0.01, 0.0]), ([2.0, 0.5], [0.5, 0.5])] {
+    for (from, to) in
+        [([0.5, 0.5], [0.5, 0.5]), ([0.0, 0.0], [0.01, 0.0]), ([2.0, 0.5], [0.5, 0.5])]
+    {
         assert!(client.ask("drag", json!({"from": from, "to": to})).is_err(), "{from:?} {to:?}");
     }
 }
@@ -318,7 +320,10 @@ fn particles_are_selected_counted_and_binned() {
 fn a_simulation_plays_steps_and_starts_again() {
     let client = Client::new("sim:dam-break?particles=300&seconds=0.4", &[]);
     let hello = client.view.hello();
-    assert_eq!((&hello["systems"][0]["live"], &hello["resolved"]["frames"]), (&json!(true), &json!(11)));
+    assert_eq!(
+        (&hello["systems"][0]["live"], &hello["resolved"]["frames"]),
+        (&json!(true), &json!(11))
+    );
     client.settle();
     let step = |action: &str| client.ask("live", json!({"action": action})).unwrap();
     step("step");
@@ -405,7 +410,9 @@ fn a_monkey_does_no_harm() {
         let asked = match random(14) {
             0 => client.ask("undo", json!({})),
             1 => client.ask("redo", json!({})),
-            2 => client.ask("resize", json!({"width": 20 + random(100), "height": 20 + random(80)})),
+            2 => {
+                client.ask("resize", json!({"width": 20 + random(100), "height": 20 + random(80)}))
+            }
             3 => client.ask("pick", json!({"x": part, "y": part})),
             4 => client.ask("select", json!({"box": [0, 0, part, 1]})),
             5 => client.set(json!({"system.0.where": format!("Position.x > {part}")})),

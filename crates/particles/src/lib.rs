@@ -7,6 +7,7 @@
 //!
 //! Invariant: nothing here knows a camera, a scene or a picture.
 
+mod age;
 mod column;
 mod demo;
 mod error;

@@ -19,8 +19,9 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
+use crate::age::Ages;
 use crate::demo::DemoReader;
-use crate::read::{self, Progress, Reader, Wanted};
+use crate::read::{self, Progress, Reader, Wanted, names};
 use crate::source::Source;
 use crate::{Particles, Place, ReadError, Result};
 
@@ -79,7 +80,7 @@ impl Series {
     }
 
     fn new(source: &str, format: &str, files: Files) -> Self {
-        let core = Core { files, cache: VecDeque::new() };
+        let core = Core { files, cache: VecDeque::new(), ages: None };
         let shared = Arc::new(Shared { core: Mutex::new(core), warnings: Mutex::new(vec![]) });
         Self { source: source.into(), format: format.into(), shared, last: None, ahead: None }
     }
@@ -135,6 +136,15 @@ impl Series {
         progress: Progress<'_>,
     ) -> Result<Particles> {
         self.shared.run(|core| core.take(frame, wanted, progress))
+    }
+
+    /// From now on particles that have identifiers, and no `Age`, get one: the time, or the frames where there is
+    /// none, since their identifier first appeared. All frames before the one asked for are read for it, once.
+    pub fn add_ages(&mut self) {
+        self.shared.run(|core| {
+            core.cache.clear();
+            core.ages.get_or_insert_default();
+        });
     }
 
     /// What was odd but could be read, so far: an incomplete last frame, a count that does not agree.
@@ -251,6 +261,8 @@ struct Core {
     files: Files,
     /// The latest last.
     cache: VecDeque<Cached>,
+    /// Where ages are asked for.
+    ages: Option<Ages>,
 }
 
 impl Core {
@@ -269,7 +281,7 @@ impl Core {
         }
         self.cache.retain(|c| c.frame != frame);
         self.make_room();
-        let particles = Arc::new(self.files.read(frame, wanted, progress)?);
+        let particles = Arc::new(self.read(frame, wanted, progress)?);
         let cached = Cached { frame, wanted: wanted.clone(), particles: particles.clone() };
         self.cache.push_back(cached);
         Ok(particles)
@@ -284,9 +296,19 @@ impl Core {
             }
             _ => {
                 self.make_room();
-                self.files.read(frame, wanted, progress)
+                self.read(frame, wanted, progress)
             }
         }
+    }
+
+    fn read(&mut self, frame: usize, wanted: &Wanted, progress: Progress<'_>) -> Result<Particles> {
+        let Some(ages) = self.ages.as_mut().filter(|_| wanted.wants(names::AGE)) else {
+            return self.files.read(frame, wanted, progress);
+        };
+        let mut particles = self.files.read(frame, &Ages::wanted(wanted), progress)?;
+        let files = &mut self.files;
+        ages.give(frame, &mut particles, |frame, wanted| files.read(frame, wanted, progress))?;
+        Ok(particles)
     }
 
     /// Before another frame as large as the latest: only that one is sure to stay.

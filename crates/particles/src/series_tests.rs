@@ -38,10 +38,16 @@ impl Reader for Fake {
         let count = self.first + frame;
         let positions = (0..count).into_par_iter().map(|i| [i as f32; 3]).collect();
         let values = crate::Values::I32(vec![frame as i32; count]);
-        let columns = match wanted.wants("Mass") {
+        let mut columns = match wanted.wants("Mass") {
             true => vec![crate::Column::new("Mass", 1, values)],
             false => vec![],
         };
+        if let Wanted::Only(_) = wanted
+            && wanted.wants(names::PARTICLE_IDENTIFIER)
+        {
+            let ids = crate::Values::I64((0..count as i64).collect());
+            columns.push(crate::Column::new(names::PARTICLE_IDENTIFIER, 1, ids));
+        }
         Ok(Particles { positions, columns, ..Particles::default() })
     }
 
@@ -261,4 +267,25 @@ fn equal_radii_are_one_radius() {
     assert_eq!(simplified(&[0.5, 0.5, 0.25]), Radius::Each(vec![0.5, 0.5, 0.25]));
     assert_eq!(simplified(&[]), Radius::Each(vec![]));
     assert_eq!(Radius::Unknown.simplified(), Radius::Unknown);
+}
+
+#[test]
+fn ages_are_known_over_files_and_only_where_they_are_wanted() {
+    let (mut series, seen) = series(&[3, 2], None);
+    let only = |name: &str| Wanted::Only(vec![name.into()]);
+    series.add_ages();
+    assert_eq!(series.frame(4, &only("Mass"), &|_, _| {}).map(|p| p.columns.len()), Ok(1));
+    assert_eq!(seen.read.load(SeqCst), 1);
+    let mut ages = |frame| {
+        let particles = series.frame(frame, &only("age"), &|_, _| {}).unwrap();
+        let column = particles.column(names::AGE).unwrap();
+        (0..column.rows()).map(|row| column.number(row, 0)).collect::<Vec<_>>()
+    };
+    // Frames 0, 1, 2 hold the particles below 0, 1, 2; frames 3 and 4 those below 100 and 101.
+    let last = ages(4);
+    assert_eq!(
+        (last.len(), &last[..3], last[99], last[100]),
+        (101, &[3.0, 2.0, 1.0][..], 1.0, 0.0)
+    );
+    assert_eq!(ages(2), [1.0, 0.0]);
 }

@@ -271,6 +271,23 @@ impl CameraView {
         }
     }
 
+    /// Distances along rays between which a box lies, from 0 (at the eye) on.
+    pub fn distances(&self, bounds: &Bounds) -> [f64; 2] {
+        let corners = bounds.corners();
+        let far = |of: &dyn Fn(DVec3) -> f64| corners.into_iter().map(of).fold(0.0, f64::max);
+        match self.projection {
+            Projection::Perspective => {
+                let nearest = self.eye.clamp(bounds.min, bounds.max);
+                [nearest.distance(self.eye), far(&|c| c.distance(self.eye))]
+            }
+            Projection::Orthographic => {
+                let along = |c: DVec3| (c - self.eye).dot(self.forward);
+                let near = corners.into_iter().map(along).fold(f64::INFINITY, f64::min);
+                [near.max(0.0), far(&along)]
+            }
+        }
+    }
+
     /// The rays in f32, relative to `origin`, a point of the world near the particles.
     pub fn rays(&self, origin: DVec3) -> Rays {
         Rays {

@@ -7,7 +7,9 @@ use crate::camera::{CameraView, Framing};
 use crate::colormap::ColorMap;
 use crate::error::{Result, SceneError};
 use crate::light::Lights;
-use crate::scene::{Camera, Film, Image, Light, Overlay, Projection, Scene, Sph, Spheres, System};
+use crate::scene::{
+    Camera, Film, Image, Light, Overlay, Preset, Projection, Scene, Sph, Spheres, System,
+};
 
 /// Most pixels of a picture: 16 384 × 16 384, some 20 GB while it is made.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -21,6 +23,8 @@ pub struct Resolved {
     pub lights: Lights,
     /// The background, in linear light.
     pub background: Background,
+    /// Distances from the eye between which what is framed lies, world units.
+    pub range: [f64; 2],
 }
 
 /// The background in linear light; both alike where it is one colour.
@@ -51,13 +55,19 @@ impl Scene {
         let bounds = framing.boxes.iter().copied().reduce(Bounds::union);
         let view = CameraView::new(&self.camera, framing, (self.image.width, self.image.height));
         let diagonal = bounds.map_or(1.0, |b| b.diagonal());
-        let lights = Lights::new(&self.light, &self.camera, &view, diagonal);
+        // Sprites are not lit.
+        let light = if self.cue.has("sprite") { &Light::of(Preset::Flat) } else { &self.light };
+        let lights = Lights::new(light, &self.camera, &view, diagonal);
         let bottom = self.image.background_bottom.unwrap_or(self.image.background);
         let background = Background {
             top: Vec3::from(self.image.background.linear()),
             bottom: Vec3::from(bottom.linear()),
         };
-        Ok(Resolved { view, lights, background })
+        let range = framing.boxes.iter().fold([f64::INFINITY, 0.0], |[near, far], b| {
+            let [a, z] = view.distances(b);
+            [a.min(near), z.max(far)]
+        });
+        Ok(Resolved { view, lights, background, range })
     }
 
     /// Refuses parameters that make no sense.
@@ -73,6 +83,7 @@ impl Scene {
         check_spheres(&self.spheres)?;
         crate::surface::check(&self.surface)?;
         crate::density::check(&self.density)?;
+        crate::cue::check(&self.cue)?;
         self.sph.check()?;
         crate::section::check(self)?;
         check_overlay(&self.overlay)
@@ -253,7 +264,11 @@ impl Sph {
         need("sph.cfl", cfl, (0.01..=2.0).contains(&cfl), "a number in 0.01 to 2")?;
         let density = self.density;
         need("sph.density", density, (1e-3..=1e6).contains(&density), "0.001 to 1e6 kg/m³")?;
-        let numbers = [("sph.viscosity", self.viscosity), ("sph.smoothing", self.smoothing)];
+        let numbers = [
+            ("sph.viscosity", self.viscosity),
+            ("sph.smoothing", self.smoothing),
+            ("sph.surface_tension", self.surface_tension),
+        ];
         for (path, v) in numbers {
             need(path, v, (0.0..=1e6).contains(&v), "a number in 0 to 1e6")?;
         }

@@ -6,6 +6,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::color::Color;
+use crate::cue::Cue;
 use crate::density::Density;
 use crate::section::Section;
 use crate::settings::{Setting, Shape, settings, words};
@@ -36,6 +37,8 @@ settings! {
         sph: Sph = Sph::default(),
         /// Planes that cut what is seen open.
         section: Vec<Section> = Vec::new(),
+        /// Cues of depth and structure, drawn into the picture.
+        cue: Cue = Cue::default(),
         /// What is drawn over the picture.
         overlay: Overlay = Overlay::default(),
     }
@@ -52,7 +55,7 @@ settings! {
         frame_offset: i64 = 0,
         /// Whether it is drawn.
         visible: bool = true,
-        /// One radius for all particles, in the file's unit of length; none: the file's, else the element's, else half the nearest distance.
+        /// One radius for all particles, in the file's unit of length; none: the file's, else the element's, else half the nearest distance (of a liquid: half the edge of the cube that each has for itself).
         radius: Option<f64> = None => "0.5",
         /// Factor on every radius, wherever it comes from.
         radius_scale: f64 = 1.0,
@@ -86,7 +89,7 @@ settings! {
 settings! {
     /// How particles get their colours.
     pub struct Coloring {
-        /// auto (the file's colours, else element, else type, else uniform), uniform, element, type, chain, or the name of a property.
+        /// auto (the file's colours, else element, else type, else uniform), uniform, element, type, chain, residue, or the name of a property.
         by: ColorBy = ColorBy::Auto,
         /// Which component of a vector property.
         component: Component = Component::Magnitude,
@@ -280,6 +283,8 @@ settings! {
         tolerance: f64 = 0.001,
         /// dfsph: iterations at the most, for each of its two solvers and time steps.
         iterations: u32 = 50,
+        /// Surface tension, N/m; of real use where drops are small: water has 0.072.
+        surface_tension: f64 = 0.0,
     }
 }
 
@@ -455,6 +460,8 @@ pub enum ColorBy {
     Type,
     /// The chain or molecule (the palette).
     Chain,
+    /// The residue's name (RasMol's colours of amino acids and nucleotides, else the palette).
+    Residue,
     /// The property of this name, through the colour map.
     Property(String),
 }
@@ -467,6 +474,7 @@ impl From<String> for ColorBy {
             "element" => Self::Element,
             "type" => Self::Type,
             "chain" => Self::Chain,
+            "residue" => Self::Residue,
             _ => Self::Property(word),
         }
     }
@@ -480,6 +488,7 @@ impl From<ColorBy> for String {
             ColorBy::Element => "element".into(),
             ColorBy::Type => "type".into(),
             ColorBy::Chain => "chain".into(),
+            ColorBy::Residue => "residue".into(),
             ColorBy::Property(name) => name,
         }
     }
@@ -487,7 +496,9 @@ impl From<ColorBy> for String {
 
 impl Setting for ColorBy {
     fn shape() -> Shape {
-        Shape::Value("auto, uniform, element, type, chain, or the name of a property".into())
+        Shape::Value(
+            "auto, uniform, element, type, chain, residue, or the name of a property".into(),
+        )
     }
 }
 

@@ -57,7 +57,11 @@ impl Scene {
 
     /// The scene with another value at a path that is known to be one of `shape`'s; none if the value is
     /// of the wrong type.
-    fn with(&self, (shape, names): (&Shape, &[&str]), value: Option<&Value>) -> Result<Option<Self>> {
+    fn with(
+        &self,
+        (shape, names): (&Shape, &[&str]),
+        value: Option<&Value>,
+    ) -> Result<Option<Self>> {
         let Ok(tree) = Table::try_from(self) else { return Ok(None) };
         let mut tree = Value::Table(tree);
         // A preset is no value beside others: it stands for all of them.
@@ -247,7 +251,8 @@ mod tests {
     #[test]
     fn values_are_put_and_taken_away() {
         let mut scene = with(&["system.color.colors.Na=red", "light.preset=sun", "camera.fov=4"]);
-        let put = |scene: &mut Scene, path: &str, value: Option<Value>| scene.put(path, value.as_ref());
+        let put =
+            |scene: &mut Scene, path: &str, value: Option<Value>| scene.put(path, value.as_ref());
         put(&mut scene, "camera.fov", Some(Value::Integer(50))).unwrap();
         put(&mut scene, "camera.position", Some(vec![1.0, 2.0, 3.0].into())).unwrap();
         put(&mut scene, "system.0.where", Some("Mass > 1".into())).unwrap();
@@ -267,7 +272,9 @@ mod tests {
         let before = scene.clone();
         let error = put(&mut scene, "camera.fov", Some("wide".into())).unwrap_err().to_string();
         assert!(error.starts_with("camera.fov: expected a number"), "{error}");
-        assert!(put(&mut scene, "camera.fow", None).unwrap_err().to_string().contains("camera.fov"));
+        assert!(
+            put(&mut scene, "camera.fow", None).unwrap_err().to_string().contains("camera.fov")
+        );
         assert!(put(&mut scene, "system.7.where", None).is_err());
         assert_eq!(scene, before);
     }

@@ -14,6 +14,8 @@ settings! {
         mode: Mode = Mode::Refractive,
         /// Radius of the balls that the liquid is made of, in radii of its particles.
         ball: f64 = 2.0,
+        /// Whether balls at the surface are fitted to it, so that outlines are smooth: on, off or auto (on up to 500,000 particles).
+        fit: Fit = Fit::Auto,
         /// The longest empty stretch of a ray that is no gap, in world units; none: 5 radii.
         gap: Option<f64> = None => "0.1",
         /// How far the surface is smoothed, as a standard deviation in world units; 0: not at all; none: 2 radii.
@@ -72,6 +74,18 @@ words! {
         Translucent = "translucent",
         /// Light is bent and mirrored.
         Refractive = "refractive",
+    }
+}
+
+words! {
+    /// Whether balls are fitted to the surface.
+    pub enum Fit {
+        /// Where they are few, and so large in the picture.
+        Auto = "auto",
+        /// They are.
+        On = "on",
+        /// They are not.
+        Off = "off",
     }
 }
 

@@ -5,6 +5,8 @@
 //! particle lacks a neighbour. The order is by two stable counting sorts, by plane and by cell, and the
 //! same for any number of threads.
 
+use fearless_simd::{Level, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
 /// How many particles are sorted by plane at a time.
@@ -58,6 +60,41 @@ impl Lattice {
         }
         cell
     }
+
+    /// Whether a point is within `reach` of a cell.
+    pub fn reaches(&self, cell: usize, point: [f32; 3], reach: f32) -> bool {
+        let edge = 1.0 / self.per_length;
+        let square: f32 = (0..3)
+            .map(|a| {
+                let along = cell / self.strides[a] % self.dims[a];
+                let from = self.low[a] + (along as f32 - 1.0) * edge;
+                (from - point[a]).max(point[a] - from - edge).max(0.0).powi(2)
+            })
+            .sum();
+        square <= reach * reach
+    }
+}
+
+/// The cells of points, as [`Lattice::cell`] has them.
+#[allow(clippy::needless_range_loop)] // iterators leave the instruction set of a kernel
+#[simd]
+fn cells<S: Simd>(simd: S, lattice: &Lattice, points: [&[f32]; 3], keys: &mut [u32]) {
+    let whole = keys.len() / 16 * 16;
+    for (n, keys) in keys[..whole].chunks_exact_mut(16).enumerate() {
+        let mut cell = u32x16::splat(simd, 0);
+        for axis in 0..3 {
+            let at = f32x16::from_slice(simd, &points[axis][n * 16..n * 16 + 16]);
+            let along = (at - lattice.low[axis]) * lattice.per_length;
+            let most = (lattice.dims[axis] - 3) as u32;
+            let along = along.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, most as f32));
+            let along = along.to_int::<u32x16<S>>().min(u32x16::splat(simd, most));
+            cell = cell + (along + 1) * lattice.strides[axis] as u32;
+        }
+        cell.store_slice(keys);
+    }
+    for (i, key) in keys.iter_mut().enumerate().skip(whole) {
+        *key = lattice.cell([points[0][i], points[1][i], points[2][i]]) as u32;
+    }
 }
 
 /// Particles sorted by cell.
@@ -73,7 +110,7 @@ pub(crate) struct Order {
 
 impl Order {
     /// Sorts `count` particles at `positions` (longer, perhaps).
-    pub fn sort(&mut self, lattice: &Lattice, positions: [&[f32]; 3], count: usize) {
+    pub fn sort(&mut self, level: Level, lattice: &Lattice, positions: [&[f32]; 3], count: usize) {
         self.keys.resize(count, 0);
         self.by_plane.resize(count, 0);
         self.from.resize(count, 0);
@@ -88,19 +125,20 @@ impl Order {
             .enumerate()
             .map(|(chunk, (keys, by_plane))| {
                 let first = chunk * CHUNK;
+                let end = first + keys.len();
+                let points = [&x[first..end], &y[first..end], &z[first..end]];
+                dispatch!(level, simd => cells(simd, lattice, points, keys));
+                let plane = lattice.plane as u32;
                 let mut starts = vec![0u32; lattice.planes + 1];
-                for (i, key) in keys.iter_mut().enumerate() {
-                    let at = first + i;
-                    let cell = lattice.cell([x[at], y[at], z[at]]);
-                    *key = cell as u32;
-                    starts[cell / lattice.plane + 1] += 1;
+                for key in &*keys {
+                    starts[(key / plane) as usize + 1] += 1;
                 }
                 for plane in 0..lattice.planes {
                     starts[plane + 1] += starts[plane];
                 }
                 let mut next = starts.clone();
                 for (i, key) in keys.iter().enumerate() {
-                    let next = &mut next[*key as usize / lattice.plane];
+                    let next = &mut next[(key / plane) as usize];
                     by_plane[*next as usize] = (first + i) as u32;
                     *next += 1;
                 }
@@ -159,7 +197,7 @@ mod tests {
         let [x, y, z] = points(20_000, [1.0, 2.0, 0.3]);
         let lattice = Lattice::new([0.0; 3], [1.0, 2.0, 0.3], 0.07);
         let mut order = Order::default();
-        order.sort(&lattice, [&x, &y, &z], 20_000);
+        order.sort(Level::new(), &lattice, [&x, &y, &z], 20_000);
         let mut seen = 0;
         for cell in 0..lattice.cells() {
             let members = &order.from[order.starts[cell] as usize..order.starts[cell + 1] as usize];

@@ -2,7 +2,7 @@
 //! Hydrodynamics*): two solvers for pressure, one so that velocities make nothing too dense, one so that
 //! nothing is too dense at the end of the step.
 //!
-//! With ∇W = −C t d (see [`crate::kernel`]) and s = Δt p/ρ², the pressures' work on the velocities is
+//! With ∇W = −C t d (see [`crate::kernel`]; lengths in supports) and s = Δt p/ρ², the pressures' work on the velocities is
 //! v_i += m C Σ_j t (s_i + s_j) d, which changes the rate of density of i itself, per s_i, by
 //! −(m C)² (G·(G + G_w) + Σ t² r²), G = Σ t d and G_w its part by walls: their factor α (Eq. 8–11). Each iteration (Alg. 3, 4) is one of Jacobi's:
 //! s_i += ω R_i / (m C)² (…), with [`Momentum`]; R is the rate to be got rid of:
@@ -23,7 +23,8 @@ use rayon::prelude::*;
 
 use crate::Simulation;
 use crate::fluid::{CHUNK, Fluid};
-use crate::passes::{Divergence, Factors, Push};
+use crate::kernel::Wendland;
+use crate::passes::{Divergence, Drag, Factors, Push};
 use crate::simulation::{Around, Greatest, Physics};
 use crate::wcsph::accelerate;
 
@@ -92,11 +93,11 @@ impl Fluid {
 fn factors(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
-    around.of(fluid, physics).sum(Factors, [], sums.each_mut().map(|row| &mut row[..n]));
+    around.of(fluid, physics).sum(Factors(Wendland), [], sums.each_mut().map(|row| &mut row[..n]));
     let scale = physics.mass * physics.kernel.value;
     let slope = physics.mass * physics.kernel.slope;
     // Where there is hardly a neighbour, as much is due to it as to one two thirds of the support away.
-    let least = (2.0 / 3.0 * physics.kernel.support / 27.0).powi(2);
+    let least = (2.0f32 / 3.0 / 27.0).powi(2);
     let rows =
         fluid.density[..n].par_chunks_mut(CHUNK).zip(fluid.factor[..n].par_chunks_mut(CHUNK));
     rows.enumerate().for_each(|(chunk, (density, factor))| {
@@ -121,9 +122,9 @@ fn forces(around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -
     let rows = fluid.pressure.iter_mut().zip(&fluid.warm[0]);
     rows.for_each(|(pressure, warm)| *pressure = unit * warm);
     let [u, v, w] = &fluid.velocity;
-    let (force, scale) = physics.force(0.0);
+    let (force, scale) = physics.force(Wendland);
     let inputs: [&[f32]; 4] = [&fluid.pressure, u, v, w];
-    around.of(fluid, physics).sum(force, inputs, [&mut a[..n], &mut b[..n], &mut c[..n]]);
+    around.of(fluid, physics).sum(Drag(force), inputs, [&mut a[..n], &mut b[..n], &mut c[..n]]);
     let greatest = accelerate(fluid, physics, ([a, b, c], scale), secs);
     fluid.sums = sums;
     greatest
@@ -204,7 +205,7 @@ fn correct(
     let sum = &mut sums[0];
     let rows = if aim == Aim::Velocity { &fluid.velocity } else { &fluid.motion };
     let inputs = rows.each_ref().map(|row| &row[..]);
-    around.of(fluid, physics).sum(Divergence, inputs, [&mut sum[..n]]);
+    around.of(fluid, physics).sum(Divergence(Wendland), inputs, [&mut sum[..n]]);
     let slope = physics.mass * physics.kernel.slope;
     let rest = physics.density;
     let parts: Vec<f64> = (
@@ -243,7 +244,7 @@ fn push(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let mut sums = std::mem::take(&mut fluid.sums);
     let [a, b, c, ..] = &mut sums;
     let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
-    around.of(fluid, physics).sum(Push, [&fluid.pressure], outputs);
+    around.of(fluid, physics).sum(Push(Wendland), [&fluid.pressure], outputs);
     let scale = physics.mass * physics.kernel.slope;
     for (row, sum) in fluid.aim(aim).iter_mut().zip([a, b, c]) {
         row[..n].par_chunks_mut(CHUNK).zip(sum[..n].par_chunks(CHUNK)).for_each(|(row, sum)| {

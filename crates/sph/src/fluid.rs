@@ -1,14 +1,16 @@
 //! The liquid: its particles in cell order, row by row.
 
+use motes_scene::Solver;
 use rayon::prelude::*;
 
 use crate::cells::{Lattice, Order};
 use crate::pairs::padded;
+use crate::simulation::Physics;
 
 /// How many particles a task works at.
 pub(crate) const CHUNK: usize = 1 << 12;
 
-/// Rows that go with the particles when they are sorted.
+/// Rows that go with the particles when they are sorted: positions and velocities, and what dfsph begins with.
 const ROWS: usize = 8;
 
 /// The particles. All rows are [`padded`].
@@ -37,7 +39,7 @@ pub(crate) struct Fluid {
     /// Sums of the pass at work.
     pub sums: [Vec<f32>; 8],
     order: Order,
-    spare: Vec<f32>,
+    spare: [Vec<f32>; ROWS],
     spare_id: Vec<u32>,
 }
 
@@ -63,16 +65,18 @@ impl Fluid {
     }
 
     /// Brings the particles into cell order.
-    pub fn sort(&mut self, lattice: &Lattice) {
+    pub fn sort(&mut self, lattice: &Lattice, physics: &Physics) {
         let [x, y, z] = &self.position;
-        self.order.sort(lattice, [x, y, z], self.count);
+        self.order.sort(physics.level, lattice, [x, y, z], self.count);
         let from = &self.order.from;
         let rows = self.position.iter_mut().chain(&mut self.velocity).chain(&mut self.warm);
-        for row in rows.take(ROWS) {
-            self.spare.resize(row.len(), 0.0);
-            gather(from, row, &mut self.spare);
-            std::mem::swap(row, &mut self.spare);
-        }
+        let most = if physics.sph.solver == Solver::Dfsph { ROWS } else { 6 };
+        let rows: Vec<_> = rows.zip(&mut self.spare).take(most).collect();
+        rows.into_par_iter().for_each(|(row, spare)| {
+            spare.resize(row.len(), 0.0);
+            gather(from, row, spare);
+            std::mem::swap(row, spare);
+        });
         self.spare_id.resize(self.count, 0);
         gather(from, &self.id, &mut self.spare_id);
         std::mem::swap(&mut self.id, &mut self.spare_id);

@@ -5,14 +5,14 @@
 //! neighbour straight ahead would count nothing. What the text asks of it is a sum over the neighbours on
 //! the +x side, greatest where all of that side is filled, nothing where it is empty. Read here as
 //!
-//! P₊ₓ = min(½ Σ over j on the +x side of (x²/r²) (1 − r/h), 1)
+//! P₊ₓ = min(κ Σ over j on the +x side of x² (1 − r²)², 1),  κ = 1.4
 //!
-//! with x the component and r the length of the way to j: x²/r² is how straight ahead j lies (and adds to
-//! 1 over the three axes), 1 − r/h how near. For particles at rest on a lattice, h/2 apart, a filled side
-//! gives 0.63; compressed liquid up to 1.
+//! with x the component and r the length of the way to j, in supports: x² is how far j lies ahead, (1 − r²)²,
+//! the square of the w of [`crate::kernel`], how near it is. For particles at rest on a lattice, h/2 apart, a
+//! filled side gives 0.63; compressed liquid up to 1.
 //!
-//! The pass adds up S = Σ (x²/r²) w and D = Σ (x|x|/r²) w, both sides at once; then P₊ = (S + D)/4 and
-//! P₋ = (S − D)/4.
+//! The pass adds up S = Σ x² w² and D = Σ x|x| w², both sides at once; then P₊ = κ (S + D)/2 and
+//! P₋ = κ (S − D)/2.
 
 use motes_grid::Grid;
 use rayon::prelude::*;
@@ -20,9 +20,12 @@ use rayon::prelude::*;
 /// +x, −x, +y, −y, +z, −z, each 0 to 1.
 pub type Mask = [f32; 6];
 
+/// κ.
+const FULL: f32 = 1.4;
+
 /// The mask from its sums; `d` points from the neighbours to the particle.
 pub(crate) fn from_sums(s: [f32; 3], d: [f32; 3]) -> Mask {
-    let side = |axis: usize, sign: f32| (0.25 * (s[axis] - sign * d[axis])).clamp(0.0, 1.0);
+    let side = |axis: usize, sign: f32| (0.5 * FULL * (s[axis] - sign * d[axis])).clamp(0.0, 1.0);
     [side(0, 1.0), side(0, -1.0), side(1, 1.0), side(1, -1.0), side(2, 1.0), side(2, -1.0)]
 }
 
@@ -38,13 +41,13 @@ fn mask_at(grid: &Grid, support: f32, slot: usize) -> Mask {
     grid.visit_near(here, support, |other| {
         let way = (grid.center(other) - here).to_array();
         let square = way.iter().map(|v| v * v).sum::<f32>();
-        let near = 1.0 - square.sqrt() / support;
-        if square > 0.0 && near > 0.0 {
+        let near = 1.0 - square / (support * support);
+        if near > 0.0 {
             for (axis, along) in way.iter().enumerate() {
                 let side = 2 * axis + usize::from(*along < 0.0);
-                sides[side] += along * along / square * near;
+                sides[side] += along * along * near * near;
             }
         }
     });
-    sides.map(|sum| (0.5 * sum).min(1.0))
+    sides.map(|sum| (FULL / (support * support) * sum).min(1.0))
 }

@@ -1,30 +1,28 @@
 //! Sums over all pairs of particles within the support: the one loop under every pass.
 //!
-//! Each pair is visited once. A cell works with itself and the thirteen cells that come after it among
-//! its neighbours: five runs of the cell order, copied into a buffer that stays in L1. Each particle of
-//! the cell meets the buffer sixteen at a time; what its partners get is added up in the buffer and
-//! brought back at the end. A plane of cells therefore writes to itself and to the next plane: first all
-//! even planes are worked at in parallel, then all odd ones, and every sum is made in the same order for
-//! any number of threads.
+//! Each pair is visited once: a particle meets those after it in its own cell and the next along its row, and
+//! those of three cells of each of the four rows that come after its own. A row of cells is worked at as a whole: its own
+//! particles, and those of the four rows, cell by cell, are copied into buffers that stay in cache. There,
+//! whom a cell meets lies together, and each of its particles meets them sixteen at a time; what partners get is
+//! added up in the buffer and brought back at the end. A plane of cells therefore writes to itself and to
+//! the next plane: first all even planes are worked at in parallel, then all odd ones, and every sum is
+//! made in the same order for any number of threads.
 //!
-//! Every contribution carries a factor w = 1 − r/h, which is 0 from the support on; so no pair needs a
-//! test.
+//! Lengths are in supports, as seen from the cell. Every contribution carries a factor
+//! w = 1 − (r/h)², no less than 0; so no pair needs a test, and none a root.
 
-use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, dispatch, f32x8, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
 use crate::cells::Lattice;
+use crate::desk::{Desk, Place, Sixteen, View, load, load_walls, store};
 use crate::walls::Walls;
 
 /// Numbers in a vector.
 pub(crate) const LANES: usize = 16;
-/// A coordinate out of everything's reach, whose square is still finite.
-const FAR: f32 = 1e15;
-/// The squared distance of those.
-const FAR_SQUARE: f32 = 1e30;
-
+/// So few particles are not worth the threads.
+const FEW: u32 = 1 << 11;
 /// The length of rows for `count` particles: a vector may be read from any of them.
 pub(crate) fn padded(count: usize) -> usize {
     count.next_multiple_of(LANES) + LANES
@@ -33,30 +31,32 @@ pub(crate) fn padded(count: usize) -> usize {
 /// Sixteen neighbours of a particle, as seen from it.
 #[derive(Clone, Copy)]
 pub(crate) struct Apart<S: Simd> {
-    /// d, from the neighbour to the particle.
+    /// d, from the neighbour to the particle, in supports.
     pub d: [f32x16<S>; 3],
-    /// r².
-    pub square: f32x16<S>,
-    /// w = max(1 − r/h, 0).
+    /// w = max(1 − d², 0).
     pub w: f32x16<S>,
 }
 
+/// What a particle gets from sixteen neighbours: a factor, which vanishes with w, and what it is of.
+pub(crate) type Found<S, const OUT: usize> = (f32x16<S>, [f32x16<S>; OUT]);
+
 /// What a pass adds up over pairs: `OUT` sums from `IN` numbers of each particle.
 pub(crate) trait Pair<const IN: usize, const OUT: usize>: Copy + Send + Sync {
-    /// Whether the partner gets the same (+1) or the opposite (−1).
+    /// Whether the partner gets the same (+1), the opposite (−1), or nobody anything but from walls (0).
     const SIGN: [f32; OUT];
+    /// Whether there are registers for four particles at a time.
+    const FOUR: bool = false;
 
-    /// What particle i gets from j. Must vanish with w.
-    fn pair<S: Simd>(
-        self,
-        at: Apart<S>,
-        i: [f32x16<S>; IN],
-        j: [f32x16<S>; IN],
-    ) -> [f32x16<S>; OUT];
+    /// What the numbers of particles are multiplied by before anything else.
+    fn units(self) -> [f32; IN] {
+        [1.0; IN]
+    }
+
+    /// What particle i gets from j.
+    fn pair<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], j: [f32x16<S>; IN]) -> Found<S, OUT>;
 
     /// What particle i gets from a sample of the wall of weight ψ/m.
-    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], weight: f32x16<S>)
-    -> [f32x16<S>; OUT];
+    fn wall<S: Simd>(self, at: Apart<S>, i: [f32x16<S>; IN], weight: f32x16<S>) -> Found<S, OUT>;
 }
 
 /// Particles in cell order, and how to go about them.
@@ -82,51 +82,6 @@ struct Task<'a, const OUT: usize> {
     sums: [&'a mut [f32]; OUT],
 }
 
-/// Sixteen numbers on a line of cache.
-#[repr(C, align(64))]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Sixteen([f32; LANES]);
-
-/// The buffer of a cell.
-struct Desk<const IN: usize, const OUT: usize> {
-    positions: [Vec<Sixteen>; 3],
-    inputs: [Vec<Sixteen>; IN],
-    sums: [Vec<Sixteen>; OUT],
-    /// The sums of the cell's own particles: not among those of the buffer, as a vector cannot be read
-    /// soon after one of its numbers was written.
-    own: [Vec<f32>; OUT],
-    walls: [Vec<Sixteen>; 4],
-}
-
-impl<const IN: usize, const OUT: usize> Desk<IN, OUT> {
-    fn new() -> Self {
-        let row = |_| vec![Sixteen::zeroed(); 16];
-        Self {
-            positions: std::array::from_fn(row),
-            inputs: std::array::from_fn(row),
-            sums: std::array::from_fn(row),
-            own: std::array::from_fn(|_| vec![]),
-            walls: std::array::from_fn(row),
-        }
-    }
-
-    /// Makes room for `count` neighbours.
-    fn reserve(&mut self, count: usize) {
-        let need = padded(count) / LANES + 1;
-        if self.positions[0].len() < need {
-            let rows = self.positions.iter_mut().chain(&mut self.inputs).chain(&mut self.sums);
-            rows.for_each(|row| row.resize(need * 2, Sixteen::zeroed()));
-        }
-    }
-
-    fn reserve_walls(&mut self, count: usize) {
-        let need = padded(count) / LANES + 1;
-        if self.walls[0].len() < need {
-            self.walls.iter_mut().for_each(|row| row.resize(need * 2, Sixteen::zeroed()));
-        }
-    }
-}
-
 impl Neighbors<'_> {
     /// Sets `sums` to the sums of `pair` over all neighbours.
     pub fn sum<P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
@@ -136,11 +91,18 @@ impl Neighbors<'_> {
         mut sums: [&mut [f32]; OUT],
     ) {
         sums.iter_mut().for_each(|row| row.par_chunks_mut(1 << 14).for_each(|part| part.fill(0.0)));
+        let sums_are_few = self.starts[self.lattice.cells()] < FEW;
         for odd in 0..2 {
             let tasks = self.tasks(odd, &mut sums);
-            tasks.into_par_iter().with_max_len(1).for_each_init(Desk::new, |desk, mut task| {
-                dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, desk));
-            });
+            let work = |at: &mut Place<IN, OUT>, mut task: Task<'_, OUT>| {
+                dispatch!(self.level, simd => plane(simd, self, (pair, &inputs), &mut task, at));
+            };
+            if sums_are_few {
+                let mut at = Place::new();
+                tasks.into_iter().for_each(|task| work(&mut at, task));
+            } else {
+                tasks.into_iter().par_bridge().for_each_init(Place::new, work);
+            }
         }
     }
 
@@ -181,206 +143,192 @@ fn plane<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     all: &Neighbors<'_>,
     (pair, inputs): (P, &[&[f32]; IN]),
     task: &mut Task<'_, OUT>,
-    desk: &mut Desk<IN, OUT>,
+    at: &mut Place<IN, OUT>,
 ) {
     let lattice = all.lattice;
     let begin = task.plane * lattice.plane;
-    for cell in begin..begin + lattice.plane {
-        let (first, end) = (all.starts[cell] as usize, all.starts[cell + 1] as usize);
+    // Not the rim.
+    for row in (begin + lattice.row..begin + lattice.plane - lattice.row).step_by(lattice.row) {
+        let (first, end) = (all.starts[row] as usize, all.starts[row + lattice.row] as usize);
         if first == end {
             continue;
         }
-        let runs = runs(lattice, all.starts, cell);
-        let total: usize = runs.iter().map(|(from, to)| to - from).sum();
-        desk.reserve(total);
-        load(simd, all, inputs, (&runs, total), desk);
-        let near_wall = all.walls.near(cell);
-        let wall_count = if near_wall { load_walls(simd, all, cell, desk) } else { 0 };
-        let own = end - first;
-        desk.own.iter_mut().for_each(|row| row.resize(own, 0.0));
-        // Two at a time read and write the buffer once.
-        for k in (0..own - own % 2).step_by(2) {
-            some::<_, _, 2, _, _>(simd, all.support, pair, (k, total, wall_count), desk);
+        let view = View::new(simd, all, (first + end) / 2);
+        load(view, all, (pair, inputs), row, at);
+        for x in 1..lattice.row - 1 {
+            let cell = row + x;
+            let own = (all.starts[cell] as usize - first, all.starts[cell + 1] as usize - first);
+            if own.0 < own.1 {
+                let walls = if all.walls.near(cell) { load_walls(view, all, cell, at) } else { 0 };
+                let next = all.starts[cell + 2] as usize - first;
+                cell_of(simd, pair, (own, next), (x, walls), at);
+            }
         }
-        if own % 2 == 1 {
-            some::<_, _, 1, _, _>(simd, all.support, pair, (own - 1, total, wall_count), desk);
-        }
-        store(simd, (&runs, task.first), desk, &mut task.sums);
+        store(simd, all, (row, task.first), at, &mut task.sums);
     }
 }
 
-/// The runs of the cell order that a cell meets: itself and those after it.
+/// Lets the particles `own` of the row meet those up to `next` and those of the rows after it; several at a
+/// time, so that the buffers are read and written once for all of them.
 #[inline(always)]
-fn runs(lattice: &Lattice, starts: &[u32], cell: usize) -> [(usize, usize); 5] {
-    let three = |middle: usize| (starts[middle - 1] as usize, starts[middle + 2] as usize);
-    let next = cell + lattice.plane;
-    [
-        (starts[cell] as usize, starts[cell + 2] as usize),
-        three(cell + lattice.row),
-        three(next - lattice.row),
-        three(next),
-        three(next + lattice.row),
-    ]
-}
-
-/// Copies the runs into the buffer, and clears its sums.
-#[inline(always)]
-fn load<S: Simd, const IN: usize, const OUT: usize>(
+fn cell_of<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
     simd: S,
-    all: &Neighbors<'_>,
-    inputs: &[&[f32]; IN],
-    (runs, total): (&[(usize, usize); 5], usize),
-    desk: &mut Desk<IN, OUT>,
+    pair: P,
+    ((begin, end), next): ((usize, usize), usize),
+    (x, walls): (usize, usize),
+    at: &mut Place<IN, OUT>,
 ) {
-    for axis in 0..3 {
-        copy(simd, all.positions[axis], runs, &mut desk.positions[axis]);
+    let mut k = begin;
+    while P::FOUR && k + 4 <= end {
+        some::<_, _, 4, _, _>(simd, pair, (k, next), (x, walls), at);
+        k += 4;
     }
-    for k in 0..IN {
-        copy(simd, inputs[k], runs, &mut desk.inputs[k]);
+    while k + 2 <= end {
+        some::<_, _, 2, _, _>(simd, pair, (k, next), (x, walls), at);
+        k += 2;
     }
-    let vectors = total.div_ceil(LANES);
-    bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.positions[0])[total..vectors * LANES]
-        .fill(FAR);
-    let zero = f32x16::splat(simd, 0.0);
-    for o in 0..OUT {
-        for v in &mut desk.sums[o][..vectors] {
-            zero.store_slice(&mut v.0);
-        }
+    if k < end {
+        some::<_, _, 1, _, _>(simd, pair, (k, next), (x, walls), at);
     }
 }
 
-/// Copies runs of `row` behind each other, in whole vectors: what is too much is overwritten.
-#[inline(always)]
-fn copy<S: Simd>(simd: S, row: &[f32], runs: &[(usize, usize)], to: &mut [Sixteen]) {
-    let to: &mut [f32] = bytemuck::cast_slice_mut(to);
-    let mut at = 0;
-    for (from, end) in runs {
-        let (mut from, mut put) = (*from, at);
-        at += end - from;
-        while put < at {
-            f32x16::from_slice(simd, &row[from..from + LANES])
-                .store_slice(&mut to[put..put + LANES]);
-            (from, put) = (from + LANES, put + LANES);
-        }
-    }
-}
-
-/// Copies the samples of walls about `cell`; how many there are.
-#[inline(always)]
-fn load_walls<S: Simd, const IN: usize, const OUT: usize>(
-    simd: S,
-    all: &Neighbors<'_>,
-    cell: usize,
-    desk: &mut Desk<IN, OUT>,
-) -> usize {
-    let (lattice, walls) = (all.lattice, all.walls);
-    let mut runs = [(0, 0); 9];
-    let mut total = 0;
-    for (n, run) in runs.iter_mut().enumerate() {
-        let plane = cell + (n / 3) * lattice.plane - lattice.plane;
-        let middle = plane + (n % 3) * lattice.row - lattice.row;
-        *run = (walls.starts[middle - 1] as usize, walls.starts[middle + 2] as usize);
-        total += run.1 - run.0;
-    }
-    if total > 0 {
-        desk.reserve_walls(total);
-        for k in 0..4 {
-            copy(simd, &walls.rows[k], &runs, &mut desk.walls[k]);
-        }
-        let end = total.next_multiple_of(LANES);
-        bytemuck::cast_slice_mut::<Sixteen, f32>(&mut desk.walls[0])[total..end].fill(FAR);
-    }
-    total
-}
-
-/// The sums of the `M` particles of the cell from `k` on, a divisor of [`LANES`]; their partners' go to
-/// the buffer.
+/// The sums of the `M` particles of the row from `k` on.
 #[inline(always)]
 fn some<S: Simd, P: Pair<IN, OUT>, const M: usize, const IN: usize, const OUT: usize>(
     simd: S,
-    support: f32,
     pair: P,
-    (k, total, wall_count): (usize, usize, usize),
-    desk: &mut Desk<IN, OUT>,
+    (k, next): (usize, usize),
+    (x, wall_count): (usize, usize),
+    at: &mut Place<IN, OUT>,
 ) {
     let zero = f32x16::splat(simd, 0.0);
-    let (vector, lane) = (k / LANES, k % LANES);
-    let (mut place, mut i) = ([[zero; 3]; M], [[zero; IN]; M]);
-    // Each particle itself and those before it have been met.
-    let mut met = [mask32x16::from_bitmask(simd, 0); M];
+    let mut these = These { place: [[zero; 3]; M], i: [[zero; IN]; M], sums: [[zero; OUT]; M] };
     for m in 0..M {
-        place[m] = of_buffer(simd, &desk.positions, (vector, lane + m));
-        i[m] = of_buffer(simd, &desk.inputs, (vector, lane + m));
-        met[m] = mask32x16::from_bitmask(simd, (2u64 << (lane + m)) - 1);
+        these.place[m] = of_buffer(simd, &at.own.positions, k + m);
+        these.i[m] = of_buffer(simd, &at.own.inputs, k + m);
     }
-    let mut sums = [[zero; OUT]; M];
-    // All of one length, so that no index needs a test.
-    let rest = vector..total.div_ceil(LANES);
-    let [x, y, z] = desk.positions.each_ref().map(|row| &row[rest.clone()]);
-    let inputs = desk.inputs.each_ref().map(|row| &row[rest.clone()]);
-    let outputs = desk.sums.each_mut().map(|row| &mut row[rest.clone()]);
-    for v in 0..rest.len() {
-        let mut j = [zero; IN];
-        for n in 0..IN {
-            j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
-        }
-        let mut theirs = [zero; OUT];
-        for m in 0..M {
-            let mut at = apart(simd, place[m], [x, y, z], v);
-            if v == 0 {
-                at.square = met[m].select(f32x16::splat(simd, FAR_SQUARE), at.square);
-            }
-            at.w = weight(at.square, support);
-            let found = pair.pair(at, i[m], j);
-            for o in 0..OUT {
-                sums[m][o] += found[o];
-                theirs[o] += found[o];
-            }
-        }
-        for o in 0..OUT {
-            let to = &mut outputs[o][v].0;
-            let before = f32x16::from_slice(simd, to);
-            let after = if P::SIGN[o] < 0.0 { before - theirs[o] } else { before + theirs[o] };
-            after.store_slice(to);
-        }
-    }
+    // Each particle itself and those before it have been met.
+    let met = k % LANES;
+    meet::<_, _, true, M, _, _>(simd, pair, (k / LANES, next, met), &mut at.own, &mut these);
+    let later = (at.begins[x - 1] / LANES, at.begins[x + 2], 0);
+    meet::<_, _, false, M, _, _>(simd, pair, later, &mut at.later, &mut these);
     for m in 0..M {
         if wall_count > 0 {
-            let walls = one_wall(simd, support, pair, (k + m, wall_count), desk);
-            for o in 0..OUT {
-                sums[m][o] += walls[o];
-            }
+            let (place, i) = (these.place[m], these.i[m]);
+            at_walls(simd, pair, (place, i, wall_count), &at.walls, &mut these.sums[m]);
         }
-        for o in 0..OUT {
-            desk.own[o][k + m] = sums[m][o].reduce_sum();
+    }
+    // Eight vectors are added up at a time.
+    for first in (0..M * OUT).step_by(8) {
+        let mut eight = [zero; 8];
+        for n in first..(M * OUT).min(first + 8) {
+            eight[n - first] = these.sums[n / OUT][n % OUT];
+        }
+        let sums = add_up(eight);
+        for n in first..(M * OUT).min(first + 8) {
+            at.sums[n % OUT][k + n / OUT] = sums[n - first];
         }
     }
 }
 
-/// The sums of particle `k` of the cell over samples of walls.
+/// The sums of the numbers of each of eight vectors.
 #[inline(always)]
-fn one_wall<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+fn add_up<S: Simd>(v: [f32x16<S>; 8]) -> [f32; 8] {
+    let twos = [halves(v[0], v[4]), halves(v[2], v[6]), halves(v[1], v[5]), halves(v[3], v[7])];
+    let sum = halves(halves(twos[0], twos[1]), halves(twos[2], twos[3]));
+    let (low, high) = sum.split();
+    let mut sums = [0.0; 8];
+    (low + high).store_slice(&mut sums);
+    sums
+}
+
+/// Half of each vector added to its other half, in turns.
+#[inline(always)]
+fn halves<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    a.zip_low(b) + a.zip_high(b)
+}
+
+/// Particles at work, each sixteen times.
+struct These<S: Simd, const M: usize, const IN: usize, const OUT: usize> {
+    place: [[f32x16<S>; 3]; M],
+    i: [[f32x16<S>; IN]; M],
+    sums: [[f32x16<S>; OUT]; M],
+}
+
+/// Lets particles meet those of the desk from vector `begin` up to particle `end`; the first `met` and, one more
+/// for each, the particles themselves not, where `MASKED`.
+#[inline(always)]
+fn meet<
+    S: Simd,
+    P: Pair<IN, OUT>,
+    const MASKED: bool,
+    const M: usize,
+    const IN: usize,
+    const OUT: usize,
+>(
     simd: S,
-    support: f32,
     pair: P,
-    (k, total): (usize, usize),
-    desk: &Desk<IN, OUT>,
-) -> [f32x16<S>; OUT] {
-    let (vector, lane) = (k / LANES, k % LANES);
-    let place = of_buffer(simd, &desk.positions, (vector, lane));
-    let i = of_buffer(simd, &desk.inputs, (vector, lane));
-    let mut sums = [f32x16::splat(simd, 0.0); OUT];
-    let vectors = total.div_ceil(LANES);
-    let [x, y, z, weights] = desk.walls.each_ref().map(|row| &row[..vectors]);
-    for v in 0..vectors {
-        let mut at = apart(simd, place, [x, y, z], v);
-        at.w = self::weight(at.square, support);
-        let found = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
+    (begin, end, met): (usize, usize, usize),
+    desk: &mut Desk<IN, OUT>,
+    these: &mut These<S, M, IN, OUT>,
+) {
+    let zero = f32x16::splat(simd, 0.0);
+    // All of one length, so that no index needs a test.
+    let part = begin..end.div_ceil(LANES).max(begin);
+    let positions = desk.positions.each_ref().map(|row| &row[part.clone()]);
+    let inputs = desk.inputs.each_ref().map(|row| &row[part.clone()]);
+    let outputs = desk.sums.each_mut().map(|row| &mut row[part.clone()]);
+    let mut sums = these.sums;
+    for v in 0..part.len() {
+        let (mut j, mut theirs) = ([zero; IN], [zero; OUT]);
+        for n in 0..IN {
+            j[n] = f32x16::from_slice(simd, &inputs[n][v].0);
+        }
         for o in 0..OUT {
-            sums[o] += found[o];
+            theirs[o] = f32x16::from_slice(simd, &outputs[o][v].0);
+        }
+        for m in 0..M {
+            let mut at = apart(simd, these.place[m], positions, v);
+            if MASKED && v < 2 {
+                let met = ((2u64 << (met + m)) - 1) >> (v * LANES);
+                at.w = mask32x16::from_bitmask(simd, met & 0xffff).select(zero, at.w);
+            }
+            let (t, found) = pair.pair(at, these.i[m], j);
+            for o in 0..OUT {
+                if P::SIGN[o] != 0.0 {
+                    let t_theirs = if P::SIGN[o] < 0.0 { -t } else { t };
+                    sums[m][o] = t.mul_add(found[o], sums[m][o]);
+                    theirs[o] = t_theirs.mul_add(found[o], theirs[o]);
+                }
+            }
+        }
+        for o in 0..OUT {
+            if P::SIGN[o] != 0.0 {
+                theirs[o].store_slice(&mut outputs[o][v].0);
+            }
         }
     }
-    sums
+    these.sums = sums;
+}
+
+/// Adds up over samples of walls.
+#[inline(always)]
+fn at_walls<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
+    simd: S,
+    pair: P,
+    (place, i, total): ([f32x16<S>; 3], [f32x16<S>; IN], usize),
+    walls: &[Vec<Sixteen>; 4],
+    sums: &mut [f32x16<S>; OUT],
+) {
+    let vectors = total.div_ceil(LANES);
+    let [x, y, z, weights] = walls.each_ref().map(|row| &row[..vectors]);
+    for v in 0..vectors {
+        let at = apart(simd, place, [x, y, z], v);
+        let (t, found) = pair.wall(at, i, f32x16::from_slice(simd, &weights[v].0));
+        for o in 0..OUT {
+            sums[o] = t.mul_add(found[o], sums[o]);
+        }
+    }
 }
 
 /// The numbers of one particle of the buffer, sixteen times.
@@ -388,61 +336,23 @@ fn one_wall<S: Simd, P: Pair<IN, OUT>, const IN: usize, const OUT: usize>(
 fn of_buffer<S: Simd, const N: usize>(
     simd: S,
     rows: &[Vec<Sixteen>; N],
-    (vector, lane): (usize, usize),
+    k: usize,
 ) -> [f32x16<S>; N] {
     let mut numbers = [f32x16::splat(simd, 0.0); N];
     for n in 0..N {
-        numbers[n] = f32x16::splat(simd, rows[n][vector].0[lane]);
+        numbers[n] = f32x16::splat(simd, rows[n][k / LANES].0[k % LANES]);
     }
     numbers
 }
 
-/// Sixteen neighbours as seen from `place`; w is still to be told.
+/// Sixteen neighbours as seen from `place`.
 #[inline(always)]
 fn apart<S: Simd>(simd: S, place: [f32x16<S>; 3], rows: [&[Sixteen]; 3], v: usize) -> Apart<S> {
-    let zero = f32x16::splat(simd, 0.0);
-    let mut d = [zero; 3];
+    let mut d = [f32x16::splat(simd, 0.0); 3];
+    let mut w = f32x16::splat(simd, 1.0);
     for axis in 0..3 {
         d[axis] = place[axis] - f32x16::from_slice(simd, &rows[axis][v].0);
+        w = (-d[axis]).mul_add(d[axis], w);
     }
-    let square = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
-    Apart { d, square, w: zero }
-}
-
-/// w = max(1 − r/h, 0).
-#[inline(always)]
-fn weight<S: Simd>(square: f32x16<S>, support: f32) -> f32x16<S> {
-    let one = f32x16::splat(square.token(), 1.0);
-    (one - square.sqrt() * (1.0 / support)).max(f32x16::splat(square.token(), 0.0))
-}
-
-/// Brings the sums of the buffer back to their particles.
-#[inline(always)]
-fn store<S: Simd, const IN: usize, const OUT: usize>(
-    simd: S,
-    (runs, first): (&[(usize, usize); 5], usize),
-    desk: &Desk<IN, OUT>,
-    sums: &mut [&mut [f32]; OUT],
-) {
-    for o in 0..OUT {
-        let from: &[f32] = bytemuck::cast_slice(&desk.sums[o]);
-        let own = runs[0].0 - first;
-        for (to, sum) in sums[o][own..].iter_mut().zip(&desk.own[o]) {
-            *to += sum;
-        }
-        let mut at = 0;
-        for (begin, end) in runs {
-            let to = &mut sums[o][begin - first..end - first];
-            let run = &from[at..at + to.len()];
-            at += to.len();
-            let mut wide = to.chunks_exact_mut(8);
-            let mut parts = run.chunks_exact(8);
-            for (to, part) in (&mut wide).zip(&mut parts) {
-                (f32x8::from_slice(simd, to) + f32x8::from_slice(simd, part)).store_slice(to);
-            }
-            for (to, part) in wide.into_remainder().iter_mut().zip(parts.remainder()) {
-                *to += part;
-            }
-        }
-    }
+    Apart { d, w: w.max(f32x16::splat(simd, 0.0)) }
 }

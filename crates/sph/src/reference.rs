@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 
 use crate::cells::{Lattice, Order};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, Kind, Smooth, Wendland};
 use crate::mask::from_sums;
 use crate::pairs::{Neighbors, Pair, padded};
 use crate::passes::{Density, DensityAndMask, Divergence, Factors, Force, Push};
@@ -11,7 +11,8 @@ use crate::random::{points, uniform};
 use crate::walls::{Solid, Walls};
 
 const SUPPORT: f32 = 0.11;
-const FORCE: Force = Force { viscosity: 0.02, push: 1.0, gravity: [0.5, -0.1, -2.0] };
+const FORCE: Force<Smooth> =
+    Force { kernel: Smooth, viscosity: 0.02, cohesion: 0.3, gravity: [0.5, -0.1, -2.0] };
 
 /// Particles in a box with walls, in cell order, with four numbers each.
 struct Case {
@@ -29,14 +30,19 @@ impl Case {
         let mut rows = points(count, size);
         let lattice = Lattice::new([-0.05; 3], size.map(|v| v + 0.05), SUPPORT);
         let mut order = Order::default();
-        order.sort(&lattice, [&rows[0], &rows[1], &rows[2]], count);
+        order.sort(Level::new(), &lattice, [&rows[0], &rows[1], &rows[2]], count);
         for row in &mut rows {
             let mut sorted: Vec<f32> = order.from.iter().map(|i| row[*i as usize]).collect();
             sorted.resize(padded(count), 0.0);
             *row = sorted;
         }
         let solids = [Solid::Box([0.0; 3], size), Solid::Ball([0.4, 0.25, 0.2], 0.1)];
-        let walls = Walls::new((&solids, 0.5), 0.5 * SUPPORT, &Kernel::new(SUPPORT), &lattice);
+        let walls = Walls::new(
+            (&solids, 0.5),
+            0.5 * SUPPORT,
+            &Kernel::new(Kind::Smooth, SUPPORT),
+            &lattice,
+        );
         let inputs = std::array::from_fn(|k| {
             (0..padded(count)).map(|i| uniform(9 + k as u64, i as u64) - 0.4).collect()
         });
@@ -63,7 +69,7 @@ impl Case {
         (0..self.count).map(|i| std::array::from_fn(|o| sums[o][i])).collect()
     }
 
-    /// The sums by definition: of the way d, w, and the numbers of both; a wall has the weight.
+    /// The sums by definition: of the way d in supports, w, and the numbers of both; a wall has the weight.
     fn slow<const OUT: usize>(
         &self,
         pair: impl Fn([f64; 3], f64, [f64; 4], [f64; 4]) -> [f64; OUT],
@@ -77,9 +83,8 @@ impl Case {
                 let mut sums = [0.0; OUT];
                 let mut add = |found: [f64; OUT]| (0..OUT).for_each(|o| sums[o] += found[o]);
                 let apart = |there: [f64; 3]| {
-                    let d: [f64; 3] = std::array::from_fn(|a| here[a] - there[a]);
-                    let r = d.iter().map(|v| v * v).sum::<f64>().sqrt();
-                    (d, (1.0 - r / f64::from(SUPPORT)).max(0.0))
+                    let d = [0, 1, 2].map(|a| (here[a] - there[a]) / f64::from(SUPPORT));
+                    (d, (1.0 - d.iter().map(|v| v * v).sum::<f64>()).max(0.0))
                 };
                 for k in (0..self.count).filter(|k| *k != i) {
                     let (d, w) = apart(place(&self.rows, k));
@@ -107,7 +112,7 @@ fn assert_near<const OUT: usize>(fast: &[[f32; OUT]], slow: &[[f64; OUT]], toler
 }
 
 fn shape(w: f64) -> f64 {
-    w.powi(4) * (5.0 - 4.0 * w)
+    w.powi(5)
 }
 
 /// Sums of some hundred f32 numbers: their rounding.
@@ -119,10 +124,17 @@ fn passes_are_sums_over_all_pairs() {
     let level = Level::new();
     let slow = case.slow(|_, w, _, _| [shape(w)], |_, w, _, weight| [shape(w) * weight]);
     assert!(slow.iter().any(|s| s[0] > 1.0));
-    assert_near(&case.fast(Density, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Density(Smooth), level), &slow, TOLERANCE);
+    let wendland = |w: f64| {
+        let d = (1.0 - w).sqrt();
+        [(1.0 - d).powi(3), (1.0 - d) * (1.0 + 4.0 * d)]
+    };
+    let value = |w: f64| wendland(w)[0] * wendland(w)[1];
+    let slow = case.slow(|_, w, _, _| [value(w)], |_, w, _, weight| [value(w) * weight]);
+    assert_near(&case.fast(Density(Wendland), level), &slow, TOLERANCE);
 
     let factors = |d: [f64; 3], w: f64, weight: f64| {
-        let t = w.powi(3) * weight;
+        let t = w.powi(4) * weight;
         [shape(w) * weight, t * d[0], t * d[1], t * d[2]]
     };
     let slow = case.slow(
@@ -135,20 +147,20 @@ fn passes_are_sums_over_all_pairs() {
             [a, b, c, e, b, c, e, 0.0]
         },
     );
-    assert_near(&case.fast(Factors, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Factors(Smooth), level), &slow, TOLERANCE);
 
     let along = |d: [f64; 3], v: [f64; 3]| (0..3).map(|a| d[a] * v[a]).sum::<f64>();
     let slow = case.slow(
-        |d, w, i, j| [w.powi(3) * along(d, [0, 1, 2].map(|a| i[a] - j[a]))],
-        |d, w, i, weight| [w.powi(3) * weight * along(d, [i[0], i[1], i[2]])],
+        |d, w, i, j| [w.powi(4) * along(d, [0, 1, 2].map(|a| i[a] - j[a]))],
+        |d, w, i, weight| [w.powi(4) * weight * along(d, [i[0], i[1], i[2]])],
     );
-    assert_near(&case.fast(Divergence, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Divergence(Smooth), level), &slow, TOLERANCE);
 
     let slow = case.slow(
-        |d, w, i, j| d.map(|d| w.powi(3) * (i[0] + j[0]) * d),
-        |d, w, i, weight| d.map(|d| 2.0 * w.powi(3) * weight * i[0] * d),
+        |d, w, i, j| d.map(|d| w.powi(4) * (i[0] + j[0]) * d),
+        |d, w, i, weight| d.map(|d| 2.0 * w.powi(4) * weight * i[0] * d),
     );
-    assert_near(&case.fast(Push, level), &slow, TOLERANCE);
+    assert_near(&case.fast(Push(Smooth), level), &slow, TOLERANCE);
 }
 
 #[test]
@@ -157,15 +169,15 @@ fn forces_are_sums_over_all_pairs() {
     let force = FORCE;
     let slow = case.slow(
         |d, w, i, j| {
-            let t = w.powi(3);
+            let t = w.powi(4);
             [0, 1, 2].map(|a| {
                 let drag = f64::from(0.02f32) * (i[a + 1] - j[a + 1]);
-                t * ((i[0] + j[0]) * d[a] - drag)
+                t * ((i[0] + j[0] - f64::from(0.3f32) * w) * d[a] - drag)
             })
         },
         |d, w, i, weight| {
             let rise = -(0..3).map(|a| f64::from(FORCE.gravity[a]) * d[a]).sum::<f64>();
-            d.map(|d| w.powi(3) * weight * (i[0] + rise.clamp(-i[0].abs(), i[0].abs())) * d)
+            d.map(|d| w.powi(4) * weight * (i[0] + rise.clamp(-i[0].abs(), i[0].abs())) * d)
         },
     );
     assert_near(&case.fast(force, Level::new()), &slow, TOLERANCE);
@@ -181,11 +193,10 @@ fn masks_are_sums_over_all_pairs() {
         .collect();
     let slow = case.slow(
         |d, w, _, _| {
-            let square: f64 = d.iter().map(|v| v * v).sum();
             let mut sides = [0.0; 6];
             for a in 0..3 {
                 // d points from the neighbour: it is on the + side where d is negative.
-                sides[2 * a + usize::from(d[a] > 0.0)] = 0.5 * d[a] * d[a] / square * w;
+                sides[2 * a + usize::from(d[a] > 0.0)] = 1.4 * d[a] * d[a] * w * w;
             }
             sides
         },

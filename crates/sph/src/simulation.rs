@@ -1,8 +1,11 @@
 //! A simulation: from frame to frame, in steps as large as the solver allows.
 //!
 //! Time steps (Monaghan 1992, §10.3; lengths in spacings Δ, λ the `cfl`): Δt ≤ λ Δ / v_max, v_max + c for
-//! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν). What is left of a frame is
-//! divided evenly.
+//! wcsph; Δt ≤ λ/4 √(Δ / a_max) for the greatest acceleration (dfsph: but by pressure); Δt ≤ Δ² / (4 ν);
+//! Δt ≤ λ √(ρ Δ³ / (4π γ)), so that the shortest waves of the surface are seen (Brackbill et al. 1992). What is left of a
+//! frame is divided evenly.
+
+use std::f64::consts::PI;
 
 use fearless_simd::Level;
 use motes_scene::{Solver, Sph};
@@ -10,10 +13,10 @@ use rayon::prelude::*;
 
 use crate::cells::Lattice;
 use crate::fluid::{CHUNK, Fluid, total};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, Kind, Smooth, Wendland};
 use crate::mask::{Mask, from_sums};
 use crate::pairs::Neighbors;
-use crate::passes::DensityAndMask;
+use crate::passes::{Density, DensityAndMask};
 use crate::scenario::Setup;
 use crate::virial::transmitted;
 use crate::walls::Walls;
@@ -132,9 +135,16 @@ impl Greatest {
 }
 
 impl Physics {
+    /// The least and the greatest corner of where particles can be: the samples of the walls of dfsph.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        let behind = 0.5 * self.spacing;
+        [self.tank[0].map(|v| v - behind), self.tank[1].map(|v| v + behind)]
+    }
+
     fn new(setup: &Setup, sph: &Sph) -> Self {
         let spacing = f64::from(setup.spacing);
-        let kernel = Kernel::new(2.0 * setup.spacing);
+        let kind = if sph.solver == Solver::Wcsph { Kind::Smooth } else { Kind::Wendland };
+        let kernel = Kernel::new(kind, 2.0 * setup.spacing);
         // A lattice at rest has the density at rest.
         let sum = kernel.lattice_sum(spacing) * f64::from(kernel.value);
         let mass = sph.density / sum;
@@ -243,11 +253,14 @@ impl Simulation {
     /// The simulation has blown up, in words.
     pub fn step(&mut self, secs: f64) -> Result<(), String> {
         self.pour(secs);
-        self.fluid.sort(&self.lattice);
-        self.greatest = match self.physics.sph.solver {
-            Solver::Wcsph => self.weakly_compressible(secs as f32),
-            Solver::Dfsph => self.divergence_free(secs as f32),
-        };
+        // In one visit to the threads, not one for each loop.
+        rayon::scope(|_| {
+            self.fluid.sort(&self.lattice, &self.physics);
+            self.greatest = match self.physics.sph.solver {
+                Solver::Wcsph => self.weakly_compressible(secs as f32),
+                Solver::Dfsph => self.divergence_free(secs as f32),
+            };
+        });
         self.stats.time += secs;
         self.stats.steps += 1;
         self.stats.step_secs = secs;
@@ -277,6 +290,9 @@ impl Simulation {
         (sph.cfl * spacing / speed)
             .min(0.25 * sph.cfl * (spacing / acceleration).sqrt())
             .min(spacing * spacing / (4.0 * f64::from(*viscosity)))
+            .min(
+                sph.cfl * (sph.density * spacing.powi(3) / (4.0 * PI * sph.surface_tension)).sqrt(),
+            )
             .min(LONGEST_STEP)
     }
 
@@ -324,10 +340,7 @@ impl Simulation {
         let n = fluid.count;
         let mut greatest = Greatest::default();
         for axis in 0..3 {
-            // Where the samples of the walls are.
-            let behind = 0.5 * physics.spacing;
-            let [low, high] = physics.tank.map(|corner| corner[axis]);
-            let (low, high) = (low - behind, high + behind);
+            let [low, high] = physics.bounds().map(|corner| corner[axis]);
             let place = fluid.position[axis][..n].par_chunks_mut(CHUNK);
             let speed = fluid.velocity[axis][..n].par_chunks_mut(CHUNK);
             let motion = &fluid.motion[axis];
@@ -355,14 +368,41 @@ impl Simulation {
         greatest
     }
 
-    /// The frame as it stands.
-    pub fn frame(&mut self) -> Frame {
-        self.fluid.sort(&self.lattice);
-        let (around, fluid, physics, stats) = self.parts();
+    /// Finds neighbours and densities, without masks.
+    pub fn find_densities(&mut self) {
+        self.fluid.sort(&self.lattice, &self.physics);
+        let (around, fluid, physics, _) = self.parts();
+        let n = fluid.count;
+        let mut sums = std::mem::take(&mut fluid.sums);
+        let (pairs, out) = (around.of(fluid, physics), [&mut sums[0][..n]]);
+        match physics.kernel.kind {
+            Kind::Wendland => pairs.sum(Density(Wendland), [], out),
+            Kind::Smooth => pairs.sum(Density(Smooth), [], out),
+        }
+        fluid.sums = sums;
+    }
+
+    /// Finds neighbours, densities and masks, as [`Simulation::frame`] does.
+    pub fn find_masks(&mut self) {
+        self.fluid.sort(&self.lattice, &self.physics);
+        let (around, fluid, physics, _) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
         let [a, b, c, d, e, f, g, _] = sums.each_mut().map(|row| &mut row[..n]);
-        around.of(fluid, physics).sum(DensityAndMask, [], [a, b, c, d, e, f, g]);
+        let (pairs, out) = (around.of(fluid, physics), [a, b, c, d, e, f, g]);
+        match physics.kernel.kind {
+            Kind::Wendland => pairs.sum(DensityAndMask(Wendland), [], out),
+            Kind::Smooth => pairs.sum(DensityAndMask(Smooth), [], out),
+        }
+        fluid.sums = sums;
+    }
+
+    /// The frame as it stands.
+    pub fn frame(&mut self) -> Frame {
+        self.find_masks();
+        let (around, fluid, physics, stats) = self.parts();
+        let n = fluid.count;
+        let mut sums = std::mem::take(&mut fluid.sums);
         let (density, pressure) = (&sums[0][..n], &mut fluid.pressure);
         let scale = physics.mass * physics.kernel.value;
         for (at, pressure) in pressure[..n].iter_mut().enumerate() {

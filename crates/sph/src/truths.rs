@@ -181,6 +181,43 @@ fn a_free_drop_keeps_its_momentum() {
     }
 }
 
+/// The greatest of a drop's extents (root mean squares along x, y, z) over the least.
+fn oblongness(positions: &[[f32; 3]]) -> f64 {
+    let n = positions.len() as f64;
+    let extent = |a: usize| {
+        let mean = positions.iter().map(|p| f64::from(p[a])).sum::<f64>() / n;
+        (positions.iter().map(|p| (f64::from(p[a]) - mean).powi(2)).sum::<f64>() / n).sqrt()
+    };
+    let [x, y, z] = [0, 1, 2].map(extent);
+    x.max(y).max(z) / x.min(y).min(z)
+}
+
+#[test]
+fn surface_tension_makes_a_bar_round_and_keeps_its_momentum() {
+    // Twice as long as wide, in an empty space; viscous, so that it comes to rest.
+    let bar = setup("dam-break?particles=432&length=0.4&width=0.2&height=0.2&tank_length=2");
+    for solver in [Solver::Dfsph, Solver::Wcsph] {
+        let run_with = |tension: &str| {
+            let mut setup = bar.clone();
+            setup.solids.clear();
+            setup.positions.iter_mut().for_each(|p| *p = [p[0] + 0.8, p[1] + 0.4, p[2] + 0.9]);
+            setup.tank[1][1] += 0.8;
+            let settings = ["gravity=0,0,0", "sound_speed=10", "viscosity=0.03", tension];
+            let mut simulation = Simulation::new(setup, &sph(solver, &settings));
+            run(&mut simulation, 25, |_, _| {});
+            assert_eq!(simulation.stats().put_back, 0);
+            simulation
+        };
+        let mut round = run_with("surface_tension=40");
+        let oblong = oblongness(&round.frame().positions);
+        assert!(oblong < 1.1, "{solver:?}: {oblong}");
+        let speed = round.momentum().map(|p| (p / 16.0).abs());
+        assert!(speed.iter().all(|v| *v < 1e-5), "{solver:?}: {speed:?}");
+        // Without, it stays as it is.
+        assert!(oblongness(&run_with("surface_tension=0").frame().positions) > 1.9);
+    }
+}
+
 #[test]
 fn a_loose_tolerance_does() {
     // A quarter of the work, in longer steps: compressed a little, and no more with time.

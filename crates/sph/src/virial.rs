@@ -1,6 +1,6 @@
 //! The pressure that is told: what neighbours pass on to each other, their virial.
 //!
-//! p_i = 1/(3 V) Σ_j ½ F_ij · d_ij = ρ₀/6 · m C Σ_j t (P_i + P_j) r²   (Irving & Kirkwood 1950, Clausius 1870)
+//! p_i = 1/(3 V) Σ_j ½ F_ij · d_ij = ρ₀/6 · m C h Σ_j t (P_i + P_j) r²   (Irving & Kirkwood 1950, Clausius 1870)
 //!
 //! with P = p/ρ² as the solver has it, V = Δ³ the volume of a particle and ρ₀ V its mass. The solver's own
 //! p is what holds its *estimate* of the density, which changes 5 % less than the volume of a lattice two
@@ -10,6 +10,7 @@
 use motes_scene::Solver;
 
 use crate::fluid::Fluid;
+use crate::kernel::{Smooth, Wendland};
 use crate::passes::Virial;
 use crate::simulation::{Around, Physics};
 
@@ -20,8 +21,14 @@ pub(crate) fn transmitted(
     physics: &Physics,
     pressure: &mut [f32],
 ) {
-    let virial = Virial { wall: if physics.sph.solver == Solver::Dfsph { 2.0 } else { 1.0 } };
-    around.of(fluid, physics).sum(virial, [&fluid.pressure], [&mut *pressure]);
-    let scale = physics.density / 6.0 * physics.mass * physics.kernel.slope;
+    let (pairs, out) = (around.of(fluid, physics), [&mut *pressure]);
+    match physics.sph.solver {
+        Solver::Dfsph => {
+            pairs.sum(Virial { kernel: Wendland, wall: 2.0 }, [&fluid.pressure], out);
+        }
+        Solver::Wcsph => pairs.sum(Virial { kernel: Smooth, wall: 1.0 }, [&fluid.pressure], out),
+    }
+    let scale =
+        physics.density / 6.0 * physics.mass * physics.kernel.slope * physics.kernel.support;
     pressure.iter_mut().for_each(|p| *p *= scale);
 }

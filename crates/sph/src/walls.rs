@@ -7,6 +7,8 @@
 //! rest touch it; or further, and are the heavier, so that their sum over a plane, as those particles see it,
 //! is the same.
 
+use rayon::prelude::*;
+
 use crate::cells::{Lattice, Order};
 use crate::kernel::Kernel;
 use crate::pairs::padded;
@@ -27,7 +29,7 @@ pub(crate) struct Walls {
     pub rows: [Vec<f32>; 4],
     /// First sample of each cell.
     pub starts: Vec<u32>,
-    /// Whether there are samples about each cell.
+    /// Whether there are samples within reach of each cell.
     near: Vec<bool>,
 }
 
@@ -45,7 +47,7 @@ impl Walls {
         let mut rows: [Vec<f32>; 3] =
             std::array::from_fn(|a| points.iter().map(|p| p[a]).collect());
         let mut order = Order::default();
-        order.sort(lattice, [&rows[0], &rows[1], &rows[2]], count);
+        order.sort(fearless_simd::Level::new(), lattice, [&rows[0], &rows[1], &rows[2]], count);
         for row in &mut rows {
             *row = order.from.iter().map(|i| row[*i as usize]).collect();
             row.resize(padded(count), 0.0);
@@ -53,9 +55,16 @@ impl Walls {
         let [x, y, z] = rows;
         let mut walls =
             Self { rows: [x, y, z, vec![0.0; padded(count)]], starts: order.starts, near: vec![] };
-        walls.near = (0..lattice.cells())
-            .map(|cell| walls.runs(lattice, cell).any(|(from, to)| to > from))
-            .collect();
+        // A hair more, as cells are told in single precision.
+        let reach = 1.001 * kernel.support;
+        let reaches = |cell: usize, k: usize| {
+            let point = [walls.rows[0][k], walls.rows[1][k], walls.rows[2][k]];
+            lattice.reaches(cell, point, reach)
+        };
+        let near = |cell: usize| {
+            walls.runs(lattice, cell).any(|(from, to)| (from..to).any(|k| reaches(cell, k)))
+        };
+        walls.near = (0..lattice.cells()).into_par_iter().map(near).collect();
         walls.weigh(f64::from(spacing), f64::from(behind), kernel, lattice);
         walls
     }
@@ -65,7 +74,7 @@ impl Walls {
         self.starts.last().map_or(0, |n| *n as usize)
     }
 
-    /// Whether there are samples about `cell`.
+    /// Whether there are samples within reach of `cell`.
     #[inline(always)]
     pub fn near(&self, cell: usize) -> bool {
         self.near[cell]
@@ -153,11 +162,12 @@ fn sample_ball(center: [f32; 3], radius: f32, spacing: f32) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::Kind;
 
     #[test]
     fn a_plane_weighs_as_much_as_liquid() {
         let (low, high, spacing) = ([0.0; 3], [1.0, 1.0, 1.0], 0.1);
-        let kernel = Kernel::new(0.2);
+        let kernel = Kernel::new(Kind::Wendland, 0.2);
         let lattice = Lattice::new([-0.05; 3], [1.05; 3], 0.2);
         let walls = Walls::new((&[Solid::Box(low, high)], 0.5), spacing, &kernel, &lattice);
         assert_eq!(walls.count(), 12usize.pow(3) - 10usize.pow(3));

@@ -425,9 +425,7 @@ impl<S: Simd> Walk<'_, S> {
         let (oc, direction) = ([x, y, z], [dx, dy, dz]);
         let blocks = match self.of.2 {
             false => blocks(simd, oc, direction, (sphere.radius, reach)),
-            true => {
-                bundle.stretches.blocks(simd, vector, (oc, direction), (sphere.radius, reach))
-            }
+            true => bundle.stretches.blocks(simd, vector, (oc, direction), (sphere.radius, reach)),
         };
         if blocks.any_true() {
             let blocked = f32x16::splat(simd, LOST);

@@ -8,6 +8,7 @@ use motes_grid::{BATCH, of_points};
 use rayon::prelude::*;
 
 use crate::cull::{Cells, Cube};
+use crate::fit::fit;
 use crate::source::{Gathered, Piece, Source, drawable};
 use crate::{Input, Params, Spray};
 
@@ -65,7 +66,7 @@ impl Boundary {
         let source = Source::new(*input);
         let survey = source.survey(level);
         let cells = Cells::new(&source, &survey, params, level);
-        let parts: Vec<Part> = (0..source.chunks())
+        let mut parts: Vec<Part> = (0..source.chunks())
             .into_par_iter()
             .map_init(<(Gathered, Part)>::default, |(gathered, part), chunk| {
                 let piece = source.piece(chunk, gathered);
@@ -73,11 +74,15 @@ impl Boundary {
                     cells: cells.as_ref(),
                     scale: input.radius_scale,
                     spray: params.spray,
+                    all_but_deep: params.fit,
                     ids: params.ids,
                 };
                 dispatch!(level, simd => keep_part(simd, &keep, &piece, part))
             })
             .collect();
+        if let Some(cells) = cells.as_ref().filter(|_| params.fit) {
+            fit(&mut parts, cells);
+        }
         let mut counts = BoundaryCounts {
             particles: survey.count,
             kept: parts.iter().map(|p| p.spheres.len()).sum(),
@@ -137,6 +142,8 @@ struct Keep<'a> {
     cells: Option<&'a Cells>,
     scale: f32,
     spray: Spray,
+    /// Whether all are kept that lie in cells that are not deep.
+    all_but_deep: bool,
     ids: bool,
 }
 
@@ -189,7 +196,7 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
                 let i = left.trailing_zeros() as usize % BATCH;
                 left &= left - 1;
                 let (p, radius) = (piece.positions[at + i], piece.radius(at + i) * keep.scale);
-                if !cells.covers(numbers[i], p, radius) {
+                if keep.all_but_deep || !cells.covers(numbers[i], p, radius) {
                     keep.add(piece, (at + i, numbers[i]), memory, &mut kept);
                 }
             }
@@ -197,7 +204,11 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
         for i in whole..count {
             let (p, radius) = (piece.positions[i], piece.radius(i) * keep.scale);
             let cell = cells.cell(p);
-            if !cells.covers(cell, p, radius) {
+            let hidden = match keep.all_but_deep {
+                true => deep_hides && cells.is_deep(cell),
+                false => cells.covers(cell, p, radius),
+            };
+            if !hidden {
                 keep.add(piece, (i, cell), memory, &mut kept);
             }
         }

@@ -60,6 +60,8 @@ pub(crate) struct Cells {
     pub low: Vec3,
     /// The edge L of a cell.
     pub edge: f32,
+    /// Cells along each axis, the empty border among them.
+    pub dims: [u32; 3],
     places: Places,
     inner: Bits,
     deep: Bits,
@@ -111,7 +113,7 @@ impl Cells {
             inner = full.eroded();
             deep = inner.eroded();
         }
-        Some(Self { low, edge, places, inner, deep, sparse })
+        Some(Self { low, edge, dims, places, inner, deep, sparse })
     }
 
     /// How many cells there are, and how many are inner.
@@ -128,6 +130,9 @@ impl Cells {
 
     /// The inner cells as cubes, each cell in one.
     pub fn cubes(&self) -> Vec<Cube> {
+        if self.inner.bits.is_empty() {
+            return Vec::new();
+        }
         let mut sizes = vec![self.inner.clone()];
         while let Some(last) = sizes.last()
             && sizes.len() < SIZES as usize
@@ -161,6 +166,11 @@ impl Cells {
     /// Whether a sphere of this radius lies within inner cells if its centre's cell is deep.
     pub fn deep_covers(&self, radius: f32) -> bool {
         radius <= (1.0 - SLACK) * self.edge
+    }
+
+    /// Whether a cell is inner.
+    pub fn is_inner(&self, cell: u32) -> bool {
+        self.inner.get(cell)
     }
 
     /// Whether a cell is deep.

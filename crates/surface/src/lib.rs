@@ -7,6 +7,7 @@
 //!   [`Spans`]
 //! - [`mod@connect`]: which of their ends are one surface
 //! - [`mod@filter`], [`mod@recursion`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
+//! - [`Surfaces::cut`]: what sections leave of them
 //! - [`shade()`]: pictures, with rays that [`mod@march`] through columns
 //!
 //! [`mod@reference`] is the definition of spans, by brute force in f64; for tests.
@@ -20,7 +21,9 @@ mod boundary;
 mod compress;
 pub mod connect;
 mod cull;
+mod cut;
 pub mod filter;
+mod fit;
 pub mod flow;
 mod intervals;
 mod items;
@@ -46,6 +49,7 @@ mod voxelize;
 
 pub use blocks::Blocks;
 pub use boundary::{Boundary, BoundaryCounts};
+pub use cut::{NO_CAP, Nearest};
 pub use media::{MOST_MEDIA, Medium};
 pub use occlusion::Occlusion;
 pub use params::{Bits, Cull, Input, Marks, Params, Particles, Representation, Spray};

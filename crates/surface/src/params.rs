@@ -34,6 +34,8 @@ pub struct Params {
     pub cell: f32,
     /// What becomes of particles by themselves.
     pub spray: Spray,
+    /// Whether balls at the surface are fitted to it. Not where there are no cells, which tell what is inside.
+    pub fit: bool,
     /// How a column is held while it is made.
     pub representation: Representation,
     /// Pixels along a tile's edge: a multiple of 4, at most 1024.
@@ -102,6 +104,7 @@ impl Default for Params {
             cull: Cull::Occupancy,
             cell: 2.3,
             spray: Spray::Liquid,
+            fit: false,
             representation: Representation::Intervals,
             tile: 64,
             ids: false,

@@ -90,10 +90,9 @@ impl<'a> Paths<'a> {
 
     /// The same of a medium.
     pub fn color_in(&self, medium: usize, surface: usize) -> Vec3 {
-        match self.around.paint {
+        match self.around.own_color(self.media[medium].medium.surfaces, surface) {
             None => self.optics.absorption,
-            Some(_) => {
-                let color = self.around.color_of(self.media[medium].medium.surfaces, surface);
+            Some(color) => {
                 let mean = self.optics.absorption.element_sum() / 3.0;
                 -color.clamp(Vec3::splat(0.02), Vec3::ONE).map(f32::ln) * mean
             }

@@ -15,7 +15,7 @@ use crate::media::{MOST_MEDIA, Medium, Passage};
 use crate::occlusion::Occlusion;
 use crate::refract::Paths;
 use crate::shadow::Shadow;
-use crate::{Blocks, Spans, Surfaces};
+use crate::{Blocks, NO_CAP, Spans, Surfaces};
 
 /// How the liquid is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +46,13 @@ pub struct Optics {
 
 /// The colours of the liquid, from particles.
 pub trait Paint: Sync {
-    /// Linear colour of the particle, by its place in the input.
-    fn color(&self, particle: u32) -> Vec3;
+    /// Linear colour of the particle, by its place in the input; `None`: the liquid's.
+    fn color(&self, particle: u32) -> Option<Vec3>;
+
+    /// Linear colour of the inside of the liquid at a point, where the cut of `owner` has laid it open, in a particle; `None`: as elsewhere.
+    fn cap(&self, _owner: u16, _point: Vec3, _particle: Option<u32>) -> Option<Vec3> {
+        None
+    }
 }
 
 /// What is around the liquid.
@@ -74,12 +79,33 @@ pub struct Around<'a> {
 impl Around<'_> {
     /// The colour of the liquid at a surface.
     pub(crate) fn color_of(&self, surfaces: &Surfaces, surface: usize) -> Vec3 {
-        let particle = surfaces.particles.get(surface).filter(|p| **p != Spans::NO_PARTICLE);
-        match (self.paint, particle) {
-            (Some(paint), Some(particle)) => paint.color(*particle),
-            _ => self.color,
-        }
+        self.own_color(surfaces, surface).unwrap_or(self.color)
     }
+
+    /// The colour of a surface's particle, if it has one of its own.
+    pub(crate) fn own_color(&self, surfaces: &Surfaces, surface: usize) -> Option<Vec3> {
+        self.paint?.color(particle_of(surfaces, surface)?)
+    }
+
+    /// The same for a surface of the column at `place`, which may be a cap.
+    pub(crate) fn color_at(
+        &self,
+        surfaces: &Surfaces,
+        (place, surface): ([usize; 2], usize),
+    ) -> Vec3 {
+        let owner = surfaces.caps.get(surface).filter(|owner| **owner != NO_CAP);
+        let cap = self.paint.zip(owner).and_then(|(paint, owner)| {
+            let place = place.map(|i| i as f32 + 0.5);
+            let point = surfaces.view.point(place, surfaces.nearness[surface]);
+            paint.cap(*owner, point, particle_of(surfaces, surface))
+        });
+        cap.unwrap_or_else(|| self.color_of(surfaces, surface))
+    }
+}
+
+/// The particle of a surface.
+fn particle_of(surfaces: &Surfaces, surface: usize) -> Option<u32> {
+    surfaces.particles.get(surface).copied().filter(|p| *p != Spans::NO_PARTICLE)
 }
 
 /// Rays that leave the liquid and what they are of which pixel: what they meet is looked up for many at once.
@@ -319,7 +345,7 @@ impl Paths<'_> {
     }
 
     fn front(&self, pixel: &Pixel, (m, first): (usize, usize)) -> Vec4 {
-        let color = self.around.color_of(self.media[m].medium.surfaces, first);
+        let color = self.around.color_at(self.media[m].medium.surfaces, (pixel.place, first));
         (color * self.falling((m, first), pixel)).extend(1.0)
     }
 }

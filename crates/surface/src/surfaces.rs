@@ -26,6 +26,8 @@ pub struct Surfaces {
     pub extended: Vec<Extended>,
     /// The particle of each surface, or empty; see [`Spans::particles`].
     pub particles: Vec<u32>,
+    /// Whose cap each surface is, [`crate::NO_CAP`] where it is none; empty where nothing was cut.
+    pub caps: Vec<u16>,
 }
 
 /// How surfaces are smoothed; lengths in world units.
@@ -86,7 +88,20 @@ impl Surfaces {
     /// The ends of `spans`, which `view` shows, with what was found of each: nearness and normal.
     pub fn of_spans(spans: Spans, view: View, (nearness, normals): (Vec<f32>, Vec<u32>)) -> Self {
         let Spans { starts, extended, particles, .. } = spans;
-        Self { view, starts, nearness, normals, extended, particles }
+        Self { view, starts, nearness, normals, extended, particles, caps: Vec::new() }
+    }
+
+    /// No surfaces at all.
+    pub(crate) fn of_nothing(view: View) -> Self {
+        Self {
+            view,
+            starts: Vec::new(),
+            nearness: Vec::new(),
+            normals: Vec::new(),
+            extended: Vec::new(),
+            particles: Vec::new(),
+            caps: Vec::new(),
+        }
     }
 
     /// The surfaces of a pixel.
@@ -132,7 +147,7 @@ impl Surfaces {
     /// Bytes of all parts.
     pub fn bytes(&self) -> usize {
         let words = self.starts.len() + 2 * self.nearness.len() + self.particles.len();
-        words * 4 + self.extended.len() * size_of::<Extended>()
+        words * 4 + self.caps.len() * 2 + self.extended.len() * size_of::<Extended>()
     }
 }
 

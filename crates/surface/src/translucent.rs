@@ -109,7 +109,7 @@ impl Paths<'_> {
                 slot.empty[lane] = surfaces.empty(pixel.index);
             }
             if around.paint.is_some() {
-                let color = around.color_of(surfaces, entry).to_array();
+                let color = around.color_at(surfaces, (pixel.place, entry)).to_array();
                 for (lanes, color) in slot.color.iter_mut().zip(color) {
                     lanes[lane] = color;
                 }

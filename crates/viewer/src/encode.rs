@@ -33,7 +33,11 @@ pub(crate) fn frame(picture: &Picture, serial: u32, codec: Codec) -> Result<Vec<
         Codec::Jpeg(quality) => {
             let mut encoder = Encoder::new(&mut out, quality);
             let sharp = quality >= SHARP;
-            encoder.set_sampling_factor(if sharp { SamplingFactor::F_1_1 } else { SamplingFactor::F_2_2 });
+            encoder.set_sampling_factor(if sharp {
+                SamplingFactor::F_1_1
+            } else {
+                SamplingFactor::F_2_2
+            });
             encoder
                 .encode(&picture.rgb, width, height, ColorType::Rgb)
                 .map_err(|e| e.to_string())?;

@@ -45,7 +45,8 @@ impl Names {
     pub fn has(&self, host: &str) -> bool {
         let Some(name) = name_of(host) else { return false };
         let address = name.parse::<IpAddr>().ok();
-        let here = name.eq_ignore_ascii_case("localhost") || address.is_some_and(|a| a.is_loopback());
+        let here =
+            name.eq_ignore_ascii_case("localhost") || address.is_some_and(|a| a.is_loopback());
         let open = self.open.as_ref();
         here || open.is_some_and(|own| address.is_some() || own.eq_ignore_ascii_case(name))
     }
@@ -86,8 +87,17 @@ mod tests {
             assert!(names.has(host), "{host}");
         }
         let foreign = [
-            "example.org", "127.0.0.1.example.org:80", "localhost.example.org", "10.0.0.1:80", "",
-            ":80", "[::1", "[::2]:80", "localhost:http", "localhost:80:80", "user@localhost",
+            "example.org",
+            "127.0.0.1.example.org:80",
+            "localhost.example.org",
+            "10.0.0.1:80",
+            "",
+            ":80",
+            "[::1",
+            "[::2]:80",
+            "localhost:http",
+            "localhost:80:80",
+            "user@localhost",
         ];
         for host in foreign {
             assert!(!names.has(host), "{host}");

@@ -315,7 +315,10 @@ struct Drawn {
 }
 
 /// The answer to request `id`.
-pub(crate) fn answer_to(id: Value, answer: Result<Map<String, Value>, String>) -> Map<String, Value> {
+pub(crate) fn answer_to(
+    id: Value,
+    answer: Result<Map<String, Value>, String>,
+) -> Map<String, Value> {
     let mut message = answer.unwrap_or_else(|error| {
         let mut failed = Map::new();
         failed.insert("error".into(), error.into());

@@ -325,7 +325,14 @@ fn nonsense_is_answered_and_harms_nothing() {
     let server = Running::start();
     let mut client = server.enter();
     let bad = [
-        "", "[]", "null", "{", "{\"do\": 3}", "{\"id\": 1}", "\u{0}", "{\"do\":\"add\"",
+        "",
+        "[]",
+        "null",
+        "{",
+        "{\"do\": 3}",
+        "{\"id\": 1}",
+        "\u{0}",
+        "{\"do\":\"add\"",
         &"[".repeat(10_000),
     ];
     for text in bad {

@@ -16,18 +16,22 @@ use motes_grid::Radii;
 use motes_scene::{Bounds, Environment, Framing, Resolved, Scene, Solver};
 use motes_sph::Simulation;
 
+use super::liquid;
 use super::shot::pack;
 use super::source::{Line, Source, poses, read};
 use super::table::{Cell, Table};
 use super::{Tables, chosen, hash, median, pool, surface_defaults, timed};
 use crate::density::{masks, optics, params};
-use crate::environment::environment;
 use crate::drawing::instruction_set;
+use crate::environment::environment;
 use crate::simulate::Simulated;
 use crate::{Error, Result, Watch, peak_memory_bytes};
 
-/// The tables: construction of the field; whole frames.
-pub const STAGES: [&str; 2] = ["table1", "fig5"];
+/// The tables: construction of the field; whole frames; what masks cost; ten seconds of simulation, which is
+/// done only where it is asked for.
+pub const STAGES: [&str; 4] = ["table1", "fig5", "mask", "endure"];
+/// Those that are done where nothing is said.
+const SHORT: usize = 3;
 /// The stages of a source: the product's field; the first field and picture of the process; both, with the
 /// camera turned; a live frame of a simulation, and its step; rays alone; the plain field and that with masks.
 pub const SOURCE_STAGES: [&str; 8] =
@@ -112,7 +116,8 @@ impl Studio {
         };
         let size = (scene.image.width, scene.image.height);
         let view = View { rays: resolved.view.rays(set.origin), size };
-        let liquid = Liquid { field: &self.field, space: &self.space, level: Level::new() };
+        let liquid =
+            Liquid { field: &self.field, space: &self.space, clip: None, level: Level::new() };
         let finer = f64::from(scene.image.samples).sqrt().floor().max(1.0) as u32;
         Ok(shade(&liquid, &view, (&optics(scene, set.bounds), &around), finer))
     }
@@ -153,20 +158,28 @@ fn fields(set: &Set, ways: &[Params], frames: usize) -> Vec<(f64, u64)> {
 /// # Errors
 /// A stage that is not there, no threads, or a simulation that blows up.
 pub fn density_tables(options: &Tables, watch: &dyn Watch) -> Result<Vec<Table>> {
-    let stages = chosen(&options.stages, &STAGES)?;
+    let mut stages = chosen(&options.stages, &STAGES)?;
+    if options.stages.is_empty() {
+        stages.truncate(SHORT);
+    }
     let pool = pool(options.threads)?;
     pool.install(|| {
         let mut tables = Vec::new();
         for (done, stage) in stages.iter().enumerate() {
             watch.progress(stage, done as u64, stages.len() as u64);
-            tables.push(if *stage == "table1" { table1(options)? } else { fig5(options)? });
+            tables.push(match *stage {
+                "table1" => table1(options)?,
+                "fig5" => fig5(options)?,
+                "mask" => liquid::mask(options)?,
+                _ => liquid::endure(options, watch)?,
+            });
         }
         Ok(tables)
     })
 }
 
 /// A scene of the tables: one sample, no shadow.
-fn scene(options: &Tables, resolution: u32) -> Scene {
+pub(super) fn scene(options: &Tables, resolution: u32) -> Scene {
     let mut scene = Scene::default();
     surface_defaults(&mut scene);
     (scene.image.width, scene.image.height) = options.size;
@@ -176,7 +189,7 @@ fn scene(options: &Tables, resolution: u32) -> Scene {
 }
 
 /// A simulation after its first steps.
-fn simulation(source: &str, scene: &Scene, steps: usize) -> Result<Simulation> {
+pub(super) fn simulation(source: &str, scene: &Scene, steps: usize) -> Result<Simulation> {
     let text = source.strip_prefix("sim:").unwrap_or(source);
     let mut simulation = Simulated::new(source, text, &scene.sph)?.begin().map_err(Error::Usage)?;
     advance(&mut simulation, steps)?;
@@ -191,7 +204,7 @@ fn advance(simulation: &mut Simulation, steps: usize) -> Result<()> {
     Ok(())
 }
 
-fn scaled(particles: f64, options: &Tables) -> usize {
+pub(super) fn scaled(particles: f64, options: &Tables) -> usize {
     ((particles * options.scale).round() as usize).max(64)
 }
 

@@ -9,11 +9,13 @@
 //! - [`surface_tables`], [`surface_source`]: the same for liquids (`surface`)
 //! - [`density_tables`], [`density_source`]: Yasuda et al. 2009 (`density`)
 //! - [`sections_tables`], [`sections_source`]: Chaudhari's cuts (`sections`)
+//! - `liquid`: the simulation by itself
 //! - `draw`: one loop over packets for every way of finding what a ray hits first
 //! - `standard_grid`, `single_ray`: what the paper compares with; they live here only
 
 mod density;
 mod draw;
+mod liquid;
 mod paper;
 mod sections;
 mod sets;

@@ -156,7 +156,7 @@ impl Body {
             resolution: Resolution::CellsPerParticle(scene.spheres.lambda as f32),
             block_cells: scene.spheres.block,
         };
-        let rule = radius::rule(&particles, system);
+        let rule = radius::rule(&particles, system, radius::Spacing::Nearest);
         let positions = particles.positions[..].into();
         let scale = system.radius_scale as f32;
         let spare = RadiusClasses::default();
@@ -281,9 +281,10 @@ impl Body {
         let radii = equal.map_or(Radii::Each(&radii[..]), Radii::Uniform);
         let alone = RadiusClasses::build(&positions[..], radii, Params::default());
         let all: Vec<_> = alone.grids.iter().map(Visibility::all).collect();
-        let ways =
-            [Spheres::new(&self.classes, sections.visible()), Spheres::new(&alone, &all)];
-        ways.map(|spheres| self.draw(spheres, &self.poses[0]));
+        let ways = [Spheres::new(&self.classes, sections.visible()), Spheres::new(&alone, &all)];
+        for spheres in ways {
+            self.draw(spheres, &self.poses[0]);
+        }
         found.hashes.insert("cropped", self.studio.hash());
         let mut times = [Vec::new(), Vec::new()];
         for pose in self.poses.iter().skip(1) {

@@ -12,10 +12,12 @@ use serde::Serialize;
 
 use super::shot::{Shot, Studio};
 use super::{chosen, median, pool, timed};
+use crate::cut::Visible;
 use crate::drawing::instruction_set;
+use crate::radius::{self, Spacing};
 use crate::session::wanted;
 use crate::system::{Loaded, visibility};
-use crate::{Error, Result, Watch, peak_memory_bytes, radius};
+use crate::{Error, Result, Watch, peak_memory_bytes};
 
 /// The stages: construction, warm; cold construction and the first frame; frames of a turning camera with
 /// one ray per pixel sample, with 16 shadow rays more, with 16 occlusion rays more.
@@ -209,7 +211,7 @@ impl Bench {
             resolution: motes_grid::Resolution::CellsPerParticle(self.scene.spheres.lambda as f32),
             block_cells: self.scene.spheres.block,
         };
-        let rule = radius::rule(particles, system);
+        let rule = radius::rule(particles, system, Spacing::of(&self.scene, 0));
         let scale = system.radius_scale as f32;
         let (ms, built) = timed(|| {
             let classes = {
@@ -220,9 +222,12 @@ impl Bench {
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;
-        let paint = crate::paint::Paint::new(particles, system, None)?;
+        let visible = Arc::new(Visible::uncut(&classes, visible));
+        let classes = Arc::new(classes);
+        let paint = Arc::new(crate::paint::Paint::new(particles, system, None)?);
         let particles = Arc::clone(particles);
-        Ok((ms, Loaded::uncut((particles, paint), (classes, visible))))
+        let caps = Arc::default();
+        Ok((ms, Loaded { number: 0, particles, sim_box: None, classes, visible, paint, caps }))
     }
 
     fn origin(&self) -> DVec3 {
@@ -271,7 +276,7 @@ impl Bench {
             ("input", self.particles.bytes()),
             ("data", grids.iter().map(motes_grid::Grid::data_bytes).sum()),
             ("grid", grids.iter().map(motes_grid::Grid::structure_bytes).sum()),
-            ("visibility", loaded.visibility_bytes()),
+            ("visibility", loaded.visible.bytes()),
         ];
         line.bytes.extend(bytes.map(|(name, bytes)| (name, bytes as u64)));
         let counted =

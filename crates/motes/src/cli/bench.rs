@@ -2,7 +2,8 @@
 
 use motes::bench::{
     Line, Source, Table, Tables, density_source, density_tables, peer_view, sections_source,
-    sections_tables, spheres_source, spheres_tables, surface_defaults, surface_source, surface_tables,
+    sections_tables, spheres_source, spheres_tables, surface_defaults, surface_source,
+    surface_tables,
 };
 use motes::{Error, Scene};
 
@@ -19,6 +20,7 @@ Examples:
   motes bench surface --scale 0.1 --stages table2,fig8   liquids: the paper's views, on smaller sets
   motes bench surface --source demo:dam:1e6 --set surface.mode=translucent --json
   motes bench density --source 'sim:dam-break?particles=27000' --set density.resolution=64
+  motes bench density --stages endure                    ten seconds of 10⁵ particles: an hour
   motes bench sections --scale 0.1                       cuts: frames, and planes that come, move and go";
 
 /// As typed.

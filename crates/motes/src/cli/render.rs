@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motes::{
-    Film, FilmSettings, Layers, Picture, Scene, SceneError, Section, Session, Shot,
-    built_in_scene, is_picture, read_scene,
+    Film, FilmSettings, Layers, Picture, Scene, SceneError, Section, Session, Shot, built_in_scene,
+    is_picture, read_scene,
 };
 
 use super::frames::{Frames, numbered};
@@ -88,6 +88,9 @@ struct Look {
     background: Option<String>,
     #[command(flatten)]
     camera: CameraFlags,
+    /// edges,depth,halo,rim,seam, or sprite
+    #[arg(long, value_name = "NAMES")]
+    cue: Option<String>,
     /// studio, soft, sun, overcast, side, …
     #[arg(long, value_name = "NAME")]
     light: Option<String>,
@@ -97,7 +100,7 @@ struct Look {
     /// Factor on every radius
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     radius_scale: Option<String>,
-    /// Property, or element, type, chain, uniform
+    /// Property, or element, type, chain, residue, …
     #[arg(long, value_name = "NAME")]
     color_by: Option<String>,
     /// viridis, magma, turbo, batlow, coolwarm, …
@@ -312,7 +315,6 @@ impl Args {
         }
         Ok(films)
     }
-
 }
 
 impl SceneFlags {
@@ -368,6 +370,7 @@ impl SceneFlags {
             ("--samples", "image.samples", &samples),
             ("--transparent", "image.transparent", &transparent),
             ("--background", "image.background", &look.background),
+            ("--cue", "cue.on", &look.cue),
             ("--light", "light.preset", &look.light),
             ("--radius", "system.radius", &look.radius),
             ("--radius-scale", "system.radius_scale", &look.radius_scale),
@@ -384,7 +387,9 @@ impl SceneFlags {
             scene.section.push(plane(section)?);
         }
         if look.cut.is_some() && scene.section.is_empty() {
-            return Err(Failure::usage("--cut: there is nothing to cut with; --section is a plane"));
+            return Err(Failure::usage(
+                "--cut: there is nothing to cut with; --section is a plane",
+            ));
         }
         set_flags(scene, &[("--cut", "section.cut", &look.cut)])?;
         for assignment in &self.set {

@@ -125,9 +125,10 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
 fn put(scene: &mut Scene, path: &str, value: &Value) -> Result<()> {
     let value = match value {
         Value::Null => None,
-        value => Some(toml::Value::try_from(without_nulls(value)).map_err(|_| {
-            missing(&format!("for {path} a value that a scene can have"))
-        })?),
+        value => Some(
+            toml::Value::try_from(without_nulls(value))
+                .map_err(|_| missing(&format!("for {path} a value that a scene can have")))?,
+        ),
     };
     Ok(scene.put(path, value.as_ref())?)
 }
@@ -247,9 +248,8 @@ fn with_particles(source: &str, count: u64) -> String {
     let Some(simulation) = source.strip_prefix("sim:") else { return source.into() };
     let (name, query) = simulation.split_once('?').unwrap_or((simulation, ""));
     let others = query.split('&').filter(|p| !p.is_empty() && !p.starts_with("particles="));
-    let all: Vec<_> = std::iter::once(format!("particles={count}"))
-        .chain(others.map(str::to_owned))
-        .collect();
+    let all: Vec<_> =
+        std::iter::once(format!("particles={count}")).chain(others.map(str::to_owned)).collect();
     format!("sim:{name}?{}", all.join("&"))
 }
 

@@ -74,7 +74,11 @@ pub(super) fn command(scene: &Scene) -> String {
 }
 
 /// `--set` for everything below `path` that is not as by default.
-fn settings(out: &mut Vec<String>, path: &str, (shape, own, default): (&Shape, Value, Option<Value>)) {
+fn settings(
+    out: &mut Vec<String>,
+    path: &str,
+    (shape, own, default): (&Shape, Value, Option<Value>),
+) {
     if default.as_ref() == Some(&own) {
         return;
     }

@@ -11,8 +11,8 @@ use motes_scene::Renderer;
 use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
 
-use super::coarse::{Pace, simple};
 use super::Frames;
+use super::coarse::{Pace, simple};
 use super::play::Turn;
 use super::state::State;
 use super::{save, schema, systems};
@@ -269,7 +269,8 @@ impl Guest {
         };
         studio.session.set_scene(of)?;
         let watch = Drawing { guest: self, number, grade, since: Instant::now(), tell };
-        let look = studio.session.look(scene.image.frame as usize, grade == Grade::Exact, &watch)?;
+        let look =
+            studio.session.look(scene.image.frame as usize, grade == Grade::Exact, &watch)?;
         Ok((look, watch.since.elapsed()))
     }
 
@@ -291,9 +292,7 @@ impl Guest {
             (None, _) => (Grade::Coarse, Next::Now),
             (Some(Grade::Exact), _) => return None,
             (Some(_), Moving::Dragged) if !rests => return None,
-            (Some(Grade::Coarse), _) if !whole && !quick => {
-                (Grade::Simple, Next::Now)
-            }
+            (Some(Grade::Coarse), _) if !whole && !quick => (Grade::Simple, Next::Now),
             (Some(_), _) => (Grade::Exact, Next::Asked),
         })
     }
@@ -356,7 +355,10 @@ impl View for Guest {
         hello.insert("colormaps".into(), schema::colormaps());
         let scene = lock(&self.state).seen();
         if let Some(seen) = &*lock(&self.seen) {
-            hello.insert("systems".into(), systems::systems(&scene, seen, self.frame_count()).into());
+            hello.insert(
+                "systems".into(),
+                systems::systems(&scene, seen, self.frame_count()).into(),
+            );
         }
         hello.insert("limits".into(), super::ask::limits());
         hello
@@ -451,7 +453,12 @@ impl Studio {
     }
 
     /// Learns from a picture how the next ones are to be.
-    fn learn(&mut self, scene: &Scene, (grade, (look, took)): (Grade, &(Look, Duration)), link: Link) {
+    fn learn(
+        &mut self,
+        scene: &Scene,
+        (grade, (look, took)): (Grade, &(Look, Duration)),
+        link: Link,
+    ) {
         match grade {
             Grade::Exact => self.exact_took = *took,
             Grade::Coarse => {

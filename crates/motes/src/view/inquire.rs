@@ -124,7 +124,9 @@ fn ball_at<'a>(
                 let depth = meets(grid.center(slot) - origin, radius, direction)?;
                 Some((depth, grid.index(slot), slot))
             });
-            met.min_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal))
+            met.min_by(|a, b| {
+                (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
+            })
         };
         let all = (0..grid.blocks.len() - 1).into_par_iter().filter_map(of_block);
         all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
@@ -156,7 +158,8 @@ fn describe(scene: &Scene, found: &Found<'_>) -> Value {
         .columns
         .iter()
         .map(|column| {
-            let all = (0..column.components).map(|c| value(&column.values, row * column.components + c));
+            let all =
+                (0..column.components).map(|c| value(&column.values, row * column.components + c));
             let mut all: Vec<Value> = all.collect();
             let value = if all.len() == 1 { all.remove(0) } else { all.into() };
             (column.name.clone(), value)
@@ -259,25 +262,30 @@ pub(super) fn histogram(seen: &Seen, fields: &Map<String, Value>) -> Result<Valu
     let property = find_property(particles, name, component(fields)?)?;
     let number = |row: usize| property.value(particles, row);
     let (none, rows) = ((f64::INFINITY, f64::NEG_INFINITY), 0..particles.len());
-    let (min, max) = rows.clone().into_par_iter().map(number).filter(|v| v.is_finite()).fold(
-        || none,
-        |(low, high), v| (v.min(low), v.max(high)),
-    ).reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (min, max) = rows
+        .clone()
+        .into_par_iter()
+        .map(number)
+        .filter(|v| v.is_finite())
+        .fold(|| none, |(low, high), v| (v.min(low), v.max(high)))
+        .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let scale = if max > min { bins as f64 / (max - min) } else { 0.0 };
     let empty = || (vec![0_u64; bins], 0_u64);
-    let (counts, missing) = rows.into_par_iter().with_min_len(1 << 14).map(number).fold(
-        empty,
-        |(mut counts, missing), v| {
+    let (counts, missing) = rows
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .map(number)
+        .fold(empty, |(mut counts, missing), v| {
             if !v.is_finite() {
                 return (counts, missing + 1);
             }
             counts[(((v - min) * scale) as usize).min(bins - 1)] += 1;
             (counts, missing)
-        },
-    ).reduce(empty, |(mut a, missing), (b, more)| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        (a, missing + more)
-    });
+        })
+        .reduce(empty, |(mut a, missing), (b, more)| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            (a, missing + more)
+        });
     Ok(json!({"min": min, "max": max, "counts": counts, "missing": missing}))
 }
 
@@ -299,7 +307,8 @@ pub(super) fn check(seen: &Seen, fields: &Map<String, Value>) -> Result<Value> {
 pub(super) fn check_changes((scene, before): (&Scene, &Scene), seen: &Seen) -> Result<()> {
     for loaded in &seen.loaded {
         let number = usize::from(loaded.number);
-        let (Some(system), Some(had)) = (scene.system.get(number), before.system.get(number)) else {
+        let (Some(system), Some(had)) = (scene.system.get(number), before.system.get(number))
+        else {
             continue;
         };
         let particles = &loaded.particles;

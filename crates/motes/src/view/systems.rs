@@ -69,7 +69,7 @@ fn short(source: &str) -> &str {
 /// Whether other particles are seen.
 pub(super) fn differ(had: &Seen, seen: &Seen) -> bool {
     let same = |(a, b): (&Loaded, &Loaded)| {
-        Arc::ptr_eq(&a.particles, &b.particles) && Arc::ptr_eq(&a.cuts, &b.cuts)
+        Arc::ptr_eq(&a.particles, &b.particles) && Arc::ptr_eq(&a.visible, &b.visible)
     };
     had.loaded.len() != seen.loaded.len() || !had.loaded.iter().zip(&seen.loaded).all(same)
 }

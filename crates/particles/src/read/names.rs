@@ -61,6 +61,8 @@ pub const ANGULAR_MOMENTUM: &str = "Angular Momentum";
 pub const DIPOLE: &str = "Dipole Orientation";
 /// How much of the surroundings is filled, in six directions: +x, −x, +y, −y, +z, −z.
 pub const PARTICLE_MASK: &str = "Particle Mask";
+/// How long ago the particle appeared; see [`crate::Series::add_ages`].
+pub const AGE: &str = "Age";
 /// Torque, three components.
 pub const TORQUE: &str = "Torque";
 

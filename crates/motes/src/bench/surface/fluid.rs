@@ -12,7 +12,7 @@ use motes_surface::{Boundary, Mode, Optics, Surfaces};
 use crate::bench::shot::pack;
 use crate::bench::{hash, timed};
 use crate::liquid::{Liquid, Matter};
-use crate::radius::{self, Rule};
+use crate::radius::{self, Rule, Spacing};
 use crate::{Error, Result, Stats, paint};
 
 /// Particles in memory, in the source's order.
@@ -101,6 +101,7 @@ impl Fluid {
             origin: DVec3::from_array(self.particles.origin),
             level: Level::new(),
             others: None,
+            opened: None,
             boundaries: None,
         }
     }
@@ -175,7 +176,7 @@ pub(super) struct Drawn {
 fn radii(particles: &Particles, scene: &Scene) -> Radii {
     let system = &scene.system[0];
     let scale = system.radius_scale as f32;
-    let rule = match radius::rule(particles, system) {
+    let rule = match radius::rule(particles, system, Spacing::Share) {
         Rule::Uniform(r) => return Radii::Uniform(r * scale),
         Rule::Each(radii) => return Radii::Each(radii.into_iter().map(|r| r * scale).collect()),
         measured => measured,
