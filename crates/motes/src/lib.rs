@@ -11,6 +11,7 @@
 //!
 //! The command line (`main.rs`) is a user of this library like any other.
 
+mod ahead;
 mod annotate;
 pub mod bench;
 mod caps;

@@ -6,12 +6,13 @@ use std::time::Instant;
 use glam::DVec3;
 use motes_frame::{Background, Curve, Frame, Tone};
 use motes_particles::read::{Wanted, names};
-use motes_particles::{Particles, Series, SimulationBox};
+use motes_particles::{Series, SimulationBox};
 use motes_scene::{
     Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene,
     Section, Show,
 };
 
+use crate::ahead::{Ahead, All};
 use crate::annotate::{Annotated, annotations};
 use crate::cut::Visible;
 use crate::drawing::{Drawing, Kept};
@@ -109,6 +110,9 @@ pub struct Session {
     scene: Scene,
     series: Vec<Arc<Mutex<Series>>>,
     pool: Option<rayon::ThreadPool>,
+    /// The frame that was read last.
+    last: Option<(Reading, All)>,
+    ahead: Ahead<Reading>,
     /// What was made of each system's last frame.
     stages: Vec<Stages>,
     /// Boxes around what is to be framed, and what they are around.
@@ -149,6 +153,8 @@ impl Session {
         Self {
             scene,
             pool: None,
+            last: None,
+            ahead: Ahead::default(),
             stages: series.iter().map(|_| Stages::default()).collect(),
             framed: None,
             kept: Kept::default(),
@@ -433,7 +439,7 @@ impl Session {
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
-    fn load(&mut self, particles: Vec<Option<Arc<Particles>>>) -> Result<(Vec<Loaded>, DVec3)> {
+    fn load(&mut self, particles: All) -> Result<(Vec<Loaded>, DVec3)> {
         let origin = particles.iter().flatten().next().map_or([0.0; 3], |p| p.origin).into();
         let mut loaded = Vec::new();
         for (i, particles) in particles.into_iter().enumerate() {
@@ -462,54 +468,74 @@ impl Session {
     }
 
     /// Reads the frame of every visible system; `None` for hidden ones.
-    fn read(
-        &mut self,
-        frame: usize,
-        after: After,
-        watch: &dyn Watch,
-    ) -> Result<Vec<Option<Arc<Particles>>>> {
-        let report = |done, total| _ = watch.progress("read", done, total);
-        let mut all = Vec::new();
-        for i in 0..self.series.len() {
-            let system = &self.scene.system[i];
-            if !system.visible {
-                all.push(None);
-                continue;
-            }
-            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(system.frame_offset);
-            let own = usize::try_from(own).map_err(|_| {
-                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
-            })?;
-            // Beside a series, what has one frame stands still.
-            let mut series = lock(&self.series[i]);
-            let still = own > 0 && self.series.len() > 1 && series.frames(&report)? == 1;
-            let own = if still { 0 } else { own };
-            let mut wanted = wanted(system);
-            let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
-            if self.scene.sections_of(i).any(|(_, section)| by_property(section)) {
-                wanted = Wanted::All;
-            }
-            let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
-            if masked && let Wanted::Only(columns) = &mut wanted {
-                columns.push(names::PARTICLE_MASK.into());
-            }
-            if self.all_columns {
-                wanted = Wanted::All;
-            }
-            let key = RangeKey::of(system);
-            if self.ranges[i].as_ref().map(|(had, _)| had) != key.as_ref() {
-                self.ranges[i] = None;
-            }
-            if let Some(key) = key.filter(|_| self.ranges[i].is_none()) {
-                let range = series_range(&mut series, system, &wanted, watch)?;
-                self.ranges[i] = Some((key, range));
-            }
-            all.push(Some(match after {
-                After::Kept | After::Moves => series.frame(own, &wanted, &report)?,
-                After::LetGo => Arc::new(series.take(own, &wanted, &report)?),
-            }));
+    fn read(&mut self, frame: usize, after: After, watch: &dyn Watch) -> Result<All> {
+        let key = self.reading(frame);
+        self.find_ranges(&key, watch)?;
+        if let Some((_, all)) = self.last.as_ref().filter(|(had, _)| *had == key) {
+            return Ok(all.clone());
+        }
+        // No two frames need be in memory, but for the memory of grids.
+        self.last = None;
+        self.stages.iter_mut().for_each(Stages::forget);
+        let all = match self.ahead.take(&key) {
+            Some(all) => all,
+            None => key.read(&self.series, after, watch)?,
+        };
+        if after != After::LetGo {
+            self.last = Some((key, all.clone()));
         }
         Ok(all)
+    }
+
+    /// Begins to read a frame, while others are drawn.
+    pub(crate) fn read_ahead(&self, frame: usize) {
+        let (key, series) = (self.reading(frame), self.series.clone());
+        let own = key.clone();
+        self.ahead.begin(key, move || own.read(&series, After::Kept, &Quiet).ok());
+    }
+
+    /// The frame that has been read so.
+    pub(crate) fn is_ahead(&self) -> Option<usize> {
+        self.ahead.ready().map(|key| key.frame)
+    }
+
+    /// What is to be read for a frame.
+    fn reading(&self, frame: usize) -> Reading {
+        let of = |(i, system): (usize, &motes_scene::System)| {
+            system.visible.then(|| (system.frame_offset, self.wanted(i, system)))
+        };
+        Reading { frame, systems: self.scene.system.iter().enumerate().map(of).collect() }
+    }
+
+    /// The columns that a system needs.
+    fn wanted(&self, i: usize, system: &motes_scene::System) -> Wanted {
+        let by_property = |s: &Section| matches!(s.cap, CapColor::Property(_));
+        if self.all_columns || self.scene.sections_of(i).any(|(_, s)| by_property(s)) {
+            return Wanted::All;
+        }
+        let mut wanted = wanted(system);
+        let masked = self.scene.renderer == Renderer::Density && self.scene.density.mask;
+        if masked && let Wanted::Only(columns) = &mut wanted {
+            columns.push(names::PARTICLE_MASK.into());
+        }
+        wanted
+    }
+
+    /// Finds the ranges of colours over whole series, where they are asked for.
+    fn find_ranges(&mut self, key: &Reading, watch: &dyn Watch) -> Result<()> {
+        for (i, system) in self.scene.system.iter().enumerate() {
+            let Some((_, wanted)) = &key.systems[i] else { continue };
+            let of = RangeKey::of(system);
+            if self.ranges[i].as_ref().map(|(had, _)| had) == of.as_ref() {
+                continue;
+            }
+            self.ranges[i] = None;
+            if let Some(of) = of {
+                let range = series_range(&mut lock(&self.series[i]), system, wanted, watch)?;
+                self.ranges[i] = Some((of, range));
+            }
+        }
+        Ok(())
     }
 
     /// Tone, cues, background and annotations.
@@ -578,6 +604,40 @@ pub(crate) struct Seen {
     pub boxes: Arc<Vec<Bounds>>,
     /// The point that positions in grids are about.
     pub origin: DVec3,
+}
+
+/// What is read for a frame: of each visible system its offset, and which columns.
+#[derive(Clone, PartialEq)]
+struct Reading {
+    frame: usize,
+    systems: Vec<Option<(i64, Wanted)>>,
+}
+
+impl Reading {
+    fn read(
+        &self,
+        all: &[Arc<Mutex<Series>>],
+        after: After,
+        watch: &dyn Watch,
+    ) -> Result<All> {
+        let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
+        let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
+            let Some((offset, wanted)) = system else { return Ok(None) };
+            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(*offset);
+            let own = usize::try_from(own).map_err(|_| {
+                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
+            })?;
+            // Beside a series, what has one frame stands still.
+            let mut series = lock(series);
+            let still = own > 0 && all.len() > 1 && series.frames(&report)? == 1;
+            let own = if still { 0 } else { own };
+            Ok(Some(match after {
+                After::Kept | After::Moves => series.frame(own, wanted, &report)?,
+                After::LetGo => Arc::new(series.take(own, wanted, &report)?),
+            }))
+        };
+        all.iter().zip(&self.systems).map(of).collect()
+    }
 }
 
 /// What boxes are made around.

@@ -123,6 +123,12 @@ impl Stages {
         Ok(Loaded { number, particles, sim_box, classes, visible, paint, caps })
     }
 
+    /// Forgets all but the memory of the grids: other particles come.
+    pub fn forget(&mut self) {
+        let grids = self.grids.take();
+        *self = Self { grids, ..Self::default() };
+    }
+
     /// Forgets what was made of other particles; gives the memory of their grids.
     fn begin(&mut self, particles: &Arc<Particles>) -> RadiusClasses {
         if self.particles.as_ref().is_some_and(|had| Arc::ptr_eq(had, particles)) {

@@ -24,7 +24,12 @@ store.addEventListener('tool', () => {
 
 /** The left button goes down with a tool in hand. @param {HTMLCanvasElement} canvas @param {PointerEvent} down */
 export function toolPress(canvas, down) {
-  if (POINTS[store.tool]) return measure(canvas, down);
+  if (POINTS[store.tool]) {
+    // What becomes a movement of two fingers is no click.
+    const near = (/** @type {PointerEvent} */ e) => Math.hypot(e.clientX - down.clientX, e.clientY - down.clientY) < 5;
+    follow(down, () => {}, (e) => e.type === 'pointerup' && near(e) && measure(canvas, down));
+    return;
+  }
   const from = within(canvas, down);
   let to = from;
   follow(down, (e) => {

@@ -23,6 +23,8 @@ use crate::{Error, Result, Scene, Session, Watch};
 const AT_ONCE: Duration = Duration::from_millis(60);
 /// After this, what moves is taken to stand still.
 const AT_REST: Duration = Duration::from_millis(150);
+/// A frame that is being read is looked for so often.
+const SOON: Duration = Duration::from_millis(3);
 /// How often more frames are looked for.
 const FOLLOWING: Duration = Duration::from_millis(250);
 /// Work that takes longer is told of.
@@ -159,29 +161,42 @@ impl Guest {
         Ok(session)
     }
 
-    /// Goes on to the frame that is due, where frame follows frame; gives for how long nothing is.
-    fn go_on(&self, tell: &(dyn Fn(Value) + Sync)) -> Option<Duration> {
+    /// Goes on to the frame that is due, where frame follows frame and it has been read; gives for how long
+    /// nothing is.
+    fn go_on(&self, session: &Session, tell: &(dyn Fn(Value) + Sync)) -> Option<Duration> {
+        let running = lock(&self.state).running?;
         let frames = u32::try_from(self.frame_count()).unwrap_or(u32::MAX);
-        let turn = self.change(|state| {
-            let turn = state.running.as_mut().map(|running| running.turn(frames, Instant::now()));
-            match turn {
-                Some(Turn::Frame(frame)) => state.go_to(frame),
-                Some(Turn::End) => {
+        let now = Instant::now();
+        let (due, wait) = match running.turn(frames, now) {
+            Turn::Frame(frame) => (frame, None),
+            Turn::Wait(time, frame) => (frame, Some(time)),
+            Turn::End => {
+                let _ = self.change(|state| {
                     state.running = None;
                     state.changed();
-                }
-                Some(Turn::Wait(_)) | None => {}
-            }
-            Ok(turn)
-        });
-        match turn {
-            Ok(Some(Turn::Wait(time))) => Some(time),
-            Ok(Some(Turn::End)) => {
+                    Ok(())
+                });
                 self.tell_scene(tell);
-                None
+                return None;
             }
-            _ => None,
+        };
+        session.read_ahead(due as usize);
+        if wait.is_some() {
+            return wait;
         }
+        // Any frame that is there is better than to wait for a later one.
+        let there = session.is_ahead().and_then(|frame| u32::try_from(frame).ok());
+        let Some(frame) = there.filter(|frame| running.play.drop || *frame == due) else {
+            return Some(SOON);
+        };
+        let _ = self.change(|state| {
+            if let Some(running) = &mut state.running {
+                running.show(frame, now);
+                state.go_to(frame);
+            }
+            Ok(())
+        });
+        None
     }
 
     /// Tells if there are more frames than before. Who follows and has seen the last one gets the new last
@@ -364,7 +379,7 @@ impl View for Guest {
             studio.drawn = None;
         }
         let look_again = self.keep_up(tell);
-        let wait = self.go_on(tell).or(look_again);
+        let wait = self.go_on(&studio.session, tell).or(look_again);
         let (scene, number, moving) = {
             let state = lock(&self.state);
             let moving = match (state.running.is_some(), state.moving()) {
