@@ -33,7 +33,8 @@ pub(super) fn mask(options: &Tables) -> Result<Table> {
             times[2].push(ms);
         }
         let [plain, masked, step] = times.map(median);
-        let cells = vec![Cell::Ms(plain), Cell::Ms(masked), Cell::Factor(masked / plain), Cell::Ms(step)];
+        let cells =
+            vec![Cell::Ms(plain), Cell::Ms(masked), Cell::Factor(masked / plain), Cell::Ms(step)];
         table.push((name, liquid.stats().particles), cells, [hash_of(&liquid)]);
     }
     Ok(table)
@@ -41,7 +42,8 @@ pub(super) fn mask(options: &Tables) -> Result<Table> {
 
 /// Ten seconds of a liquid that two columns fall into, by both solvers.
 pub(super) fn endure(options: &Tables, watch: &dyn Watch) -> Result<Table> {
-    let title = "ten simulated seconds: the greatest speed (m/s), mean compression, and energy over that of the start";
+    let title = "ten simulated seconds: the greatest speed (m/s), mean compression, and energy over \
+                 that of the start";
     let columns = ["Time", "Steps", "Speed", "Compression", "Energy", "Put back"];
     let mut table = Table::new("endure", title, &columns);
     let source = format!("sim:double-dam-break?particles={}", scaled(ENDURING, options));
