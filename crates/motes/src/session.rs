@@ -614,12 +614,7 @@ struct Reading {
 }
 
 impl Reading {
-    fn read(
-        &self,
-        all: &[Arc<Mutex<Series>>],
-        after: After,
-        watch: &dyn Watch,
-    ) -> Result<All> {
+    fn read(&self, all: &[Arc<Mutex<Series>>], after: After, watch: &dyn Watch) -> Result<All> {
         let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
         let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
             let Some((offset, wanted)) = system else { return Ok(None) };
