@@ -187,7 +187,7 @@ fn forces_are_sums_over_all_pairs() {
 fn masks_are_sums_over_all_pairs() {
     let case = Case::new(1500);
     let fast: Vec<[f32; 6]> = case
-        .fast(DensityAndMask, Level::new())
+        .fast(DensityAndMask(Smooth), Level::new())
         .into_iter()
         .map(|s: [f32; 7]| from_sums([s[1], s[2], s[3]], [s[4], s[5], s[6]]))
         .collect();

@@ -277,8 +277,8 @@ pub(crate) fn cap_normals<S: Simd>(
         let (at, slope, _) = crossing(simd, face, rays);
         let own = left & at.simd_eq(distance);
         let sign = slope.simd_gt(zero).select(f32x16::splat(simd, -1.0), f32x16::splat(simd, 1.0));
-        for axis in 0..3 {
-            normal[axis] = own.select(sign * face.plane.normal[axis], normal[axis]);
+        for (axis, normal) in normal.iter_mut().enumerate() {
+            *normal = own.select(sign * face.plane.normal[axis], *normal);
         }
         let mut lanes = own.to_bitmask();
         while lanes != 0 {

@@ -214,11 +214,11 @@ impl Hits {
             // Met where the ray leaves the sphere, from outside it.
             let wall = own & outside & distance.simd_gt(middle);
             let (normal, owners) = cap_normals(simd, clip, lines, (distance, on));
-            for axis in 0..3 {
-                let row = &mut self.normal[axis][lanes.clone()];
+            for (row, normal) in self.normal.iter_mut().zip(normal) {
+                let row = &mut row[lanes.clone()];
                 let sphere = f32x16::from_slice(simd, row);
                 let sphere = wall.select(-sphere, sphere);
-                on.select(normal[axis], sphere).store_slice(row);
+                on.select(normal, sphere).store_slice(row);
             }
             if on.any_true() {
                 self.capped = true;

@@ -103,7 +103,7 @@ fn random_clip(random: &mut Random, round: usize) -> Clip {
     let clause = |random: &mut Random| {
         let face = |random: &mut Random| Face {
             plane: Plane::new(random.point().as_dvec3(), random.direction().as_dvec3()).unwrap(),
-            cut: if round % 2 == 0 || random.unit() < 0.5 { Cut::Caps } else { Cut::Open },
+            cut: if round.is_multiple_of(2) || random.unit() < 0.5 { Cut::Caps } else { Cut::Open },
             owner: 0,
         };
         let faces = 1 + usize::from(random.unit() < 0.4) + usize::from(random.unit() < 0.2);
@@ -185,7 +185,7 @@ fn shaft<S: Simd>(simd: S, rays: &[Ray], systems: &[Spheres<'_>]) -> Vec<bool> {
 
 /// Spheres of one size or of many; in every other group of rounds, cut.
 fn scene(random: &mut Random, round: usize) -> Scene {
-    let radii = if round % 2 == 0 { (0.01, 0.02) } else { (0.002, 0.08) };
+    let radii = if round.is_multiple_of(2) { (0.01, 0.02) } else { (0.002, 0.08) };
     let scene = Scene::new(random, 400, radii);
     match round / 3 % 2 {
         0 => scene,

@@ -90,7 +90,8 @@ impl Cuts {
         for (index, (center, radius)) in self.spheres.iter().enumerate() {
             let clip = &self.clips[self.kind(index)];
             let center = Vec3::from_array(*center);
-            if !clip.by_center().keeps(center, *radius) {
+            let by_center = |clause: &&Clause| !clause.is_exact();
+            if !clip.clauses.iter().filter(by_center).all(|clause| clause.keeps(center, *radius)) {
                 continue;
             }
             let face = |f: &Face| reference::Face {

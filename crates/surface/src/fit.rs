@@ -208,7 +208,6 @@ fn neighbours(balls: &[Ball], reach: f32, dims: [u32; 3]) -> Neighbours {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::{Boundary, Input, Params, Particles};
     use fearless_simd::Level;
     use motes_grid::Radii;

@@ -210,13 +210,13 @@ fn file(name: &str, headers: &HeaderMap) -> Response {
 type Words = BTreeMap<String, String>;
 
 /// The query, if it has the token.
-fn admitted(house: &House, uri: &Uri) -> Result<Words, Response> {
+fn admitted(house: &House, uri: &Uri) -> Result<Words, (StatusCode, &'static str)> {
     let Ok(Query(words)) = Query::<Words>::try_from_uri(uri) else {
-        return Err(refuse(StatusCode::BAD_REQUEST, "the query makes no sense"));
+        return Err((StatusCode::BAD_REQUEST, "the query makes no sense"));
     };
     match words.get("token") {
         Some(token) if guard::same(token, &house.token) => Ok(words),
-        _ => Err(refuse(StatusCode::UNAUTHORIZED, "open the address that `motes view` printed")),
+        _ => Err((StatusCode::UNAUTHORIZED, "open the address that `motes view` printed")),
     }
 }
 
@@ -227,7 +227,7 @@ async fn connect(
 ) -> Response {
     let words = match admitted(&house, &uri) {
         Ok(words) => words,
-        Err(refused) => return refused,
+        Err((status, why)) => return refuse(status, why),
     };
     let upgrade = match upgrade {
         Ok(upgrade) => upgrade,
@@ -254,7 +254,7 @@ async fn connect(
 async fn save(State(house): State<Arc<House>>, Path(name): Path<String>, uri: Uri) -> Response {
     let words = match admitted(&house, &uri) {
         Ok(words) => words,
-        Err(refused) => return refused,
+        Err((status, why)) => return refuse(status, why),
     };
     let Some(visit) = words.get("view").and_then(|key| house.hall.find(key)) else {
         return refuse(StatusCode::NOT_FOUND, "there is no such view");

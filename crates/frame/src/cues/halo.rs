@@ -6,6 +6,8 @@
 //! before itself, so that nothing falls onto what casts it. (As occlusion from the depths of a picture, Luft,
 //! Colditz & Deussen 2006, but each neighbour counts no more than once, however near it is.)
 
+#![allow(clippy::needless_range_loop)] // closures and iterators leave the instruction set of a kernel
+
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use fearless_simd_macros::simd;
 use rayon::prelude::*;

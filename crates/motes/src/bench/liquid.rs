@@ -42,7 +42,8 @@ pub(super) fn mask(options: &Tables) -> Result<Table> {
 
 /// Ten seconds of a liquid that two columns fall into, by both solvers.
 pub(super) fn endure(options: &Tables, watch: &dyn Watch) -> Result<Table> {
-    let title = "ten simulated seconds: the greatest speed (m/s), mean compression, and energy over that of the start";
+    let title = "ten simulated seconds: the greatest speed (m/s), mean compression, and energy over \
+                 that of the start";
     let columns = ["Time", "Steps", "Speed", "Compression", "Energy", "Put back"];
     let mut table = Table::new("endure", title, &columns);
     let source = format!("sim:double-dam-break?particles={}", scaled(ENDURING, options));
