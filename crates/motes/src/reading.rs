@@ -33,12 +33,7 @@ impl Reading {
     ///
     /// # Errors
     /// A frame is not there, or cannot be read.
-    pub fn read(
-        &self,
-        all: &[Arc<Mutex<Series>>],
-        after: After,
-        watch: &dyn Watch,
-    ) -> Result<All> {
+    pub fn read(&self, all: &[Arc<Mutex<Series>>], after: After, watch: &dyn Watch) -> Result<All> {
         let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
         let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
             let Some((offset, wanted)) = system else { return Ok(None) };

@@ -552,38 +552,6 @@ pub(crate) struct Seen {
     pub origin: DVec3,
 }
 
-<<<<<<< HEAD
-=======
-/// What is read for a frame: of each visible system its offset, and which columns.
-#[derive(Clone, PartialEq)]
-struct Reading {
-    frame: usize,
-    systems: Vec<Option<(i64, Wanted)>>,
-}
-
-impl Reading {
-    fn read(&self, all: &[Arc<Mutex<Series>>], after: After, watch: &dyn Watch) -> Result<All> {
-        let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
-        let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
-            let Some((offset, wanted)) = system else { return Ok(None) };
-            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(*offset);
-            let own = usize::try_from(own).map_err(|_| {
-                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
-            })?;
-            // Beside a series, what has one frame stands still.
-            let mut series = lock(series);
-            let still = own > 0 && all.len() > 1 && series.frames(&report)? == 1;
-            let own = if still { 0 } else { own };
-            Ok(Some(match after {
-                After::Kept | After::Moves => series.frame(own, wanted, &report)?,
-                After::LetGo => Arc::new(series.take(own, wanted, &report)?),
-            }))
-        };
-        all.iter().zip(&self.systems).map(of).collect()
-    }
-}
-
->>>>>>> int
 /// What boxes are made around.
 #[derive(PartialEq)]
 struct Framed(Same<Visible>, Option<SimulationBox>, DVec3);
