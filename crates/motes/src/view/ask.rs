@@ -271,3 +271,38 @@ fn resize(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
         Ok(())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulations_get_other_particles() {
+        for (source, expected) in [
+            ("sim:drop", "sim:drop?particles=7"),
+            ("sim:drop?particles=3", "sim:drop?particles=7"),
+            ("sim:drop?a=1&particles=3&b=2", "sim:drop?particles=7&a=1&b=2"),
+            ("file.xyz", "file.xyz"),
+        ] {
+            assert_eq!(with_particles(source, 7), expected);
+        }
+    }
+
+    #[test]
+    fn json_becomes_a_scene() {
+        let mut scene = Scene::default();
+        let filter = json!([{"property": "Mass", "min": 1, "max": null}]);
+        put(&mut scene, "system.0.filter", &filter).unwrap();
+        put(&mut scene, "camera.position", &json!([1, 2.5, 3])).unwrap();
+        assert_eq!(
+            (scene.system[0].filter[0].min, scene.system[0].filter[0].max),
+            (Some(1.0), None)
+        );
+        assert_eq!(scene.camera.position.map(|p| p.to_array()), Some([1.0, 2.5, 3.0]));
+        put(&mut scene, "camera.position", &Value::Null).unwrap();
+        assert_eq!(scene.camera.position, None);
+        let huge = json!(18_446_744_073_709_551_615_u64);
+        assert!(put(&mut scene, "image.samples", &huge).is_err());
+        assert!(put(&mut scene, "camera.position", &json!([1, 2])).is_err());
+    }
+}

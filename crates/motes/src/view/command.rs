@@ -130,3 +130,58 @@ pub(super) fn same_source(a: &str, b: &str) -> bool {
     };
     absolute(a) == absolute(b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(assignments: &[&str]) -> Scene {
+        let mut scene = Scene::default();
+        scene.set_sources(&["demo:random:9".into(), "/some where/it's.xyz".into()]);
+        assignments.iter().for_each(|a| scene.set_text(a).unwrap());
+        scene
+    }
+
+    #[test]
+    fn only_what_differs_is_said() {
+        let plain =
+            "motes render demo:random:9 '/some where/it'\\''s.xyz' -o picture.png --size 640x480";
+        let size = ["image.width=640", "image.height=480"];
+        assert_eq!(command(&scene(&size)), plain);
+        let more =
+            [&size[..], &["light.preset=sun", "light.fill=0.5", "system.1.radius=2"]].concat();
+        let expected = format!(
+            "{plain} --set 'system.1.radius=2.0' --set 'light.preset=\"sun\"' --set light.fill=0.5"
+        );
+        let words = |text: &str| {
+            let mut words: Vec<_> =
+                text.replace('\'', "").split(" --").map(str::to_owned).collect();
+            words.sort();
+            words
+        };
+        assert_eq!(words(&command(&scene(&more))), words(&expected));
+    }
+
+    #[test]
+    fn the_text_reads_as_the_scene() {
+        for assignments in [
+            &[][..],
+            &["camera.position=1,2,3", "system.where=x > 'a'", "renderer=surface"],
+            &["system.1.color.colors={ \"a.b\" = \"red\" }", "light.preset=soft"],
+            &[
+                "system.0.filter=[{ property = \"Mass\", min = 2 }]",
+                "camera.keyframe=[{ at = 0.5 }]",
+            ],
+        ] {
+            let scene = scene(assignments);
+            assert_eq!(Scene::from_toml(&scene_text(&scene)), Ok(scene), "{assignments:?}");
+        }
+    }
+
+    #[test]
+    fn sources_are_the_same_however_written() {
+        let here = std::env::current_dir().unwrap().join("a.xyz");
+        assert!(same_source("a.xyz", here.to_str().unwrap()) && same_source("demo:a", "demo:a"));
+        assert!(!same_source("a.xyz", "b.xyz"));
+    }
+}
