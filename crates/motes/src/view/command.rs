@@ -1,6 +1,6 @@
 //! The command line that makes the very picture that is shown, and its scene as text.
 
-use motes_scene::{Scene, Setting, Shape};
+use motes_scene::{Light, Scene, Setting, Shape};
 use toml::{Table, Value};
 
 use crate::session::make_absolute;
@@ -10,9 +10,19 @@ pub(super) fn scene_text(scene: &Scene) -> String {
     let mut scene = scene.clone();
     scene.system.iter_mut().for_each(|system| make_absolute(&mut system.source));
     let own = Table::try_from(&scene).unwrap_or_default();
-    let defaults = Table::try_from(Scene::default()).unwrap_or_default();
+    let defaults = Table::try_from(defaults(&scene)).unwrap_or_default();
     let table = differences(&own, &defaults, &Scene::shape());
     toml::to_string(&table).unwrap_or_default()
+}
+
+/// What a scene is compared with: the rest of its light with what its preset says.
+fn defaults(scene: &Scene) -> Scene {
+    let mut defaults = Scene::default();
+    let one = defaults.system.first().cloned().unwrap_or_default();
+    defaults.system.resize(scene.system.len(), one);
+    let preset = defaults.light.preset;
+    defaults.light = Light { preset, ..Light::of(scene.light.preset) };
+    defaults
 }
 
 /// The fields of a table that are not as by default; lists whole, their items without defaults.
@@ -56,18 +66,7 @@ pub(super) fn command(scene: &Scene) -> String {
         (image.width, image.height)
     };
     let own = Table::try_from(&scene).unwrap_or_default();
-    let mut defaults = Scene::default();
-    let one = defaults.system.first().cloned().unwrap_or_default();
-    defaults.system.resize(scene.system.len(), one);
-    // A preset is what the rest of the light is compared with.
-    defaults.light = motes_scene::Light::of(scene.light.preset);
-    let preset = Value::try_from(scene.light.preset).ok();
-    if defaults.light != Scene::default().light
-        && let Some(preset) = preset
-    {
-        words.push(set("light.preset", &preset));
-    }
-    let defaults = Table::try_from(&defaults).unwrap_or_default();
+    let defaults = Table::try_from(defaults(&scene)).unwrap_or_default();
     let root = (&Scene::shape(), Value::Table(own), Some(Value::Table(defaults)));
     settings(&mut words, "", root);
     words.join(" ")
@@ -167,6 +166,7 @@ mod tests {
         for assignments in [
             &[][..],
             &["camera.position=1,2,3", "system.where=x > 'a'", "renderer=surface"],
+            &["light.preset=sun", "light.softness=12", "light.fill=0.45"],
             &["system.1.color.colors={ \"a.b\" = \"red\" }", "light.preset=soft"],
             &[
                 "system.0.filter=[{ property = \"Mass\", min = 2 }]",
