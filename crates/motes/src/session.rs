@@ -1,25 +1,23 @@
 //! A scene with its sources open: frames on demand.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use glam::DVec3;
 use motes_frame::{Background, Curve, Frame, Tone};
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Series, SimulationBox};
-use motes_scene::{
-    Bounds, CapColor, ColorBy, Component, Framing, Moment, RangeOver, Renderer, Resolved, Scene,
-    Section, Show,
-};
+use motes_scene::{Bounds, CapColor, Framing, Renderer, Resolved, Scene, Section, Show};
 
 use crate::ahead::{Ahead, All};
 use crate::annotate::{Annotated, annotations};
 use crate::cut::Visible;
 use crate::drawing::{Drawing, Kept};
 use crate::memo::Same;
-use crate::opacity::ALPHA;
-use crate::paint::{Meaning, find_property};
+use crate::paint::Meaning;
 use crate::picture::Picture;
+use crate::reading::{After, RangeKey, Reading, lock, series_range, wanted};
+use crate::shot::Shot;
 use crate::stages::Stages;
 use crate::stats::{Stats, peak_memory_bytes};
 use crate::system::{Loaded, asks_for_ages};
@@ -32,45 +30,6 @@ pub enum Layers {
     No,
     /// All of them.
     Yes,
-}
-
-/// What a picture is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shot {
-    /// The frame of the sources.
-    pub frame: usize,
-    /// When in a film, for a camera that moves in one; none: it stands.
-    pub moment: Option<Moment>,
-}
-
-impl From<usize> for Shot {
-    /// A frame, before a camera that stands.
-    fn from(frame: usize) -> Self {
-        Self { frame, moment: None }
-    }
-}
-
-/// Seconds of a film of a single frame, where nothing else is said.
-const STILL_SECONDS: f64 = 8.0;
-
-impl Shot {
-    /// The pictures of a film of some frames, as many as the scene says.
-    pub fn film(scene: &Scene, frames: std::ops::RangeInclusive<usize>) -> Vec<Self> {
-        let (first, last) = (*frames.start(), *frames.end());
-        let frames = (last + 1).saturating_sub(first);
-        let pictures = match scene.film.frames {
-            Some(pictures) => pictures as usize,
-            None if frames == 1 && scene.camera.moves() => {
-                (STILL_SECONDS * scene.film.fps).ceil() as usize
-            }
-            None => frames,
-        };
-        let shot = |picture| Self {
-            frame: first + picture * frames / pictures,
-            moment: Some(Moment { picture, pictures }),
-        };
-        (0..pictures).map(shot).collect()
-    }
 }
 
 /// Room for a legend, in heights of its text.
@@ -93,16 +52,6 @@ impl Watch for Quiet {
     fn progress(&self, _: &'static str, _: u64, _: u64) -> bool {
         true
     }
-}
-
-/// What becomes of a frame that was rendered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum After {
-    /// It may be asked for again.
-    Kept,
-    LetGo,
-    /// It is one of many that pass by: as Kept, but what a liquid hides of lines is not found out.
-    Moves,
 }
 
 /// A scene whose sources are open.
@@ -189,6 +138,8 @@ impl Session {
         for (i, system) in self.scene.system.iter().enumerate() {
             if asks_for_ages(system) && !asks_for_ages(&before.system[i]) {
                 lock(&self.series[i]).add_ages();
+                // What was read before has none.
+                self.last = None;
             }
         }
         Ok(())
@@ -571,11 +522,6 @@ pub(crate) fn free_right(scene: &Scene, loaded: &[Loaded]) -> f64 {
     if legend { LEGEND_EMS * text } else { 0.0 }
 }
 
-/// Locks a series, which is whole whoever held it.
-fn lock(series: &Mutex<Series>) -> MutexGuard<'_, Series> {
-    series.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// A picture before it is finished, and what it is of.
 struct Drawn {
     raw: Frame,
@@ -606,35 +552,6 @@ pub(crate) struct Seen {
     pub origin: DVec3,
 }
 
-/// What is read for a frame: of each visible system its offset, and which columns.
-#[derive(Clone, PartialEq)]
-struct Reading {
-    frame: usize,
-    systems: Vec<Option<(i64, Wanted)>>,
-}
-
-impl Reading {
-    fn read(&self, all: &[Arc<Mutex<Series>>], after: After, watch: &dyn Watch) -> Result<All> {
-        let (frame, report) = (self.frame, |done, total| _ = watch.progress("read", done, total));
-        let of = |(series, system): (&Arc<Mutex<Series>>, &Option<(i64, Wanted)>)| {
-            let Some((offset, wanted)) = system else { return Ok(None) };
-            let own = i64::try_from(frame).unwrap_or(i64::MAX).saturating_add(*offset);
-            let own = usize::try_from(own).map_err(|_| {
-                Error::Usage(format!("frame {frame}: frame_offset leads before the first frame"))
-            })?;
-            // Beside a series, what has one frame stands still.
-            let mut series = lock(series);
-            let still = own > 0 && all.len() > 1 && series.frames(&report)? == 1;
-            let own = if still { 0 } else { own };
-            Ok(Some(match after {
-                After::Kept | After::Moves => series.frame(own, wanted, &report)?,
-                After::LetGo => Arc::new(series.take(own, wanted, &report)?),
-            }))
-        };
-        all.iter().zip(&self.systems).map(of).collect()
-    }
-}
-
 /// What boxes are made around.
 #[derive(PartialEq)]
 struct Framed(Same<Visible>, Option<SimulationBox>, DVec3);
@@ -642,18 +559,6 @@ struct Framed(Same<Visible>, Option<SimulationBox>, DVec3);
 impl Framed {
     fn of(loaded: &Loaded, origin: DVec3) -> Self {
         Self(Same(loaded.visible.clone()), loaded.sim_box, origin)
-    }
-}
-
-/// What the range of colours over a series is of; none where it is the frame's.
-#[derive(Clone, PartialEq)]
-struct RangeKey(ColorBy, Component, bool);
-
-impl RangeKey {
-    fn of(system: &motes_scene::System) -> Option<Self> {
-        let color = &system.color;
-        let series = color.range_over == RangeOver::Series;
-        series.then(|| Self(color.by.clone(), color.component, color.log))
     }
 }
 
@@ -668,55 +573,6 @@ pub(crate) fn make_absolute(source: &mut String) {
 
 pub(crate) fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
-}
-
-/// The columns that colours and radii need; all, where a property's name or an expression may mean any.
-pub(crate) fn wanted(system: &motes_scene::System) -> Wanted {
-    let by = match &system.color.by {
-        ColorBy::Auto => vec![names::COLOR, ALPHA],
-        ColorBy::Chain => vec![names::CHAIN, names::MOLECULE_IDENTIFIER],
-        ColorBy::Residue => vec![names::RESIDUE_NAME],
-        ColorBy::Uniform | ColorBy::Element | ColorBy::Type => vec![],
-        ColorBy::Property(_) => return Wanted::All,
-    };
-    if !system.r#where.trim().is_empty() || !system.filter.is_empty() {
-        return Wanted::All;
-    }
-    Wanted::Only(
-        by.into_iter()
-            .chain([names::PARTICLE_TYPE, names::TRANSPARENCY])
-            .map(str::to_owned)
-            .collect(),
-    )
-}
-
-/// The range of the colouring property over all frames.
-fn series_range(
-    series: &mut Series,
-    system: &motes_scene::System,
-    wanted: &Wanted,
-    watch: &dyn Watch,
-) -> Result<Option<[f64; 2]>> {
-    let ColorBy::Property(name) = &system.color.by else { return Ok(None) };
-    let quiet = |_, _| {};
-    let frames = series.frames(&quiet)?;
-    let mut range: Option<[f64; 2]> = None;
-    for frame in 0..frames {
-        if !watch.progress("range", frame as u64, frames as u64) {
-            return Err(Error::Cancelled);
-        }
-        let particles = series.frame(frame, wanted, &quiet)?;
-        // Frames without particles may come without columns.
-        if particles.is_empty() {
-            continue;
-        }
-        let property = find_property(&particles, name, system.color.component)?;
-        if let Some([low, high]) = property.range(&particles, system.color.log) {
-            let [a, b] = range.unwrap_or([low, high]);
-            range = Some([a.min(low), b.max(high)]);
-        }
-    }
-    Ok(range)
 }
 
 fn count(stats: &mut Stats, loaded: &[Loaded]) {

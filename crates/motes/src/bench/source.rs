@@ -15,7 +15,7 @@ use super::{chosen, median, pool, timed};
 use crate::cut::Visible;
 use crate::drawing::instruction_set;
 use crate::radius::{self, Spacing};
-use crate::session::wanted;
+use crate::reading::wanted;
 use crate::system::{Loaded, visibility};
 use crate::{Error, Result, Watch, peak_memory_bytes};
 
