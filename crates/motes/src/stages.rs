@@ -32,7 +32,7 @@ pub(crate) struct Stages {
     forgotten: bool,
     paint: Option<(PaintKey, Arc<Paint>)>,
     visible: Option<(VisibleKey, CutKey, Arc<Visible>)>,
-    caps: Option<((Vec<Section>, Coloring, Same<Visible>), Arc<Caps>)>,
+    caps: Option<(CapKey, Arc<Caps>)>,
 }
 
 /// What grids depend on besides particles.
@@ -60,6 +60,10 @@ struct PaintKey {
 /// What visibility depends on besides particles: the system without what does not matter to it.
 #[derive(PartialEq)]
 struct VisibleKey(System);
+
+/// What the colours of caps depend on.
+#[derive(PartialEq)]
+struct CapKey(Vec<Section>, Coloring, Same<Visible>);
 
 /// What cuts depend on besides what is visible without them.
 #[derive(PartialEq)]
@@ -245,7 +249,7 @@ impl Stages {
         (visible, origin): (&Arc<Visible>, DVec3),
     ) -> Result<Arc<Caps>> {
         let sections = scene.sections_of(number).map(|(_, section)| section.clone()).collect();
-        let key = (sections, scene.system[number].color.clone(), Same(visible.clone()));
+        let key = CapKey(sections, scene.system[number].color.clone(), Same(visible.clone()));
         match &self.caps {
             Some((had, caps)) if *had == key => Ok(caps.clone()),
             _ => {
@@ -341,7 +345,7 @@ mod tests {
             let grid = &loaded.classes.grids[0];
             let blocks = 0..grid.blocks.len() - 1;
             let of_block = |block| {
-                let seen = loaded.visible[0].block(grid, block);
+                let seen = loaded.visible()[0].block(grid, block);
                 grid.particles_of(block).enumerate().filter(|(i, _)| seen.shows(*i)).count()
             };
             blocks.map(of_block).sum::<usize>()

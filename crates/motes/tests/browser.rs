@@ -3,6 +3,8 @@
 //! `MOTES_BROWSER` names a folder whose `node_modules` has playwright-core. What is missing is said, and the
 //! tests are left out; with `MOTES_BROWSER_TESTS=1` it is an error.
 
+#![allow(clippy::disallowed_methods)] // what a machine has is found in its environment
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -58,7 +60,6 @@ fn the_viewer_in_a_browser() {
         .env("CHROMIUM", chromium)
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&run.stdout);
-    println!("{said}");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let [said, wrong] = [run.stdout, run.stderr].map(|s| String::from_utf8_lossy(&s).into_owned());
+    assert!(run.status.success(), "{said}\n{wrong}");
 }

@@ -1,7 +1,6 @@
 //! The viewer's side of the scene: what is drawn at rest is what `motes render` makes, what is asked is
 //! answered, and everything can be taken back.
 
-use std::cell::RefCell;
 use std::process::Command;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -16,7 +15,6 @@ const SIZE: [u32; 2] = [120, 80];
 struct Client {
     view: Box<dyn View>,
     told: Mutex<Vec<Value>>,
-    id: RefCell<u32>,
 }
 
 fn scene(source: &str, assignments: &[&str]) -> Scene {
@@ -29,7 +27,7 @@ fn scene(source: &str, assignments: &[&str]) -> Scene {
 impl Client {
     fn of(scene: Scene) -> Self {
         let view = Gallery::open(scene).unwrap().open().unwrap();
-        let client = Self { view, told: Mutex::default(), id: RefCell::default() };
+        let client = Self { view, told: Mutex::default() };
         client.ask("resize", json!({"width": SIZE[0], "height": SIZE[1]})).unwrap();
         client
     }
@@ -39,7 +37,6 @@ impl Client {
     }
 
     fn ask(&self, what: &str, fields: Value) -> Result<Map<String, Value>, String> {
-        *self.id.borrow_mut() += 1;
         let Value::Object(fields) = fields else { panic!("{fields}") };
         let request = Request { what: what.into(), fields };
         self.view.ask(&request, &|value| self.told.lock().unwrap().push(value))
@@ -382,7 +379,7 @@ fn a_growing_file_is_followed() {
     let mut gallery = Gallery::open(scene).unwrap();
     gallery.follow(Duration::from_millis(20)).unwrap();
     let view = gallery.open().unwrap();
-    let client = Client { view, told: Mutex::default(), id: RefCell::default() };
+    let client = Client { view, told: Mutex::default() };
     assert_eq!(client.settle().frame, 1);
     std::fs::write(&path, frames(5)).unwrap();
     let until = Instant::now() + Duration::from_secs(20);
