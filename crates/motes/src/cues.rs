@@ -25,7 +25,8 @@ pub(crate) fn draw(
         return Ok(());
     }
     let stroke = |word: &str, (strength, width): (f64, f64), color: Color| {
-        let stroke = Stroke { strength: strength as f32, width: width as f32, color: color.linear() };
+        let stroke =
+            Stroke { strength: strength as f32, width: width as f32, color: color.linear() };
         cue.has(word).then_some(stroke)
     };
     let fade = || Fade { strength: cue.depth as f32, color: cue.depth_color.map(Color::linear) };

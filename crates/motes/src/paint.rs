@@ -119,9 +119,11 @@ impl Paint {
                 let of = [names::CHAIN, names::MOLECULE_IDENTIFIER];
                 categories(category_column(particles, &of)?, coloring, nothing)
             }
-            ColorBy::Residue => {
-                categories(category_column(particles, &[names::RESIDUE_NAME])?, coloring, residue_color)
-            }
+            ColorBy::Residue => categories(
+                category_column(particles, &[names::RESIDUE_NAME])?,
+                coloring,
+                residue_color,
+            ),
             ColorBy::Property(name) => by_property(particles, coloring, name, range)?,
         };
         let own_color = match how {

@@ -105,7 +105,8 @@ impl Session {
             "" => Err(Error::Usage("no source: name a file, a pattern or demo:…".into())),
             _ => crate::open_with(source, &scene.sph),
         };
-        let mut series = scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
+        let mut series =
+            scene.system.iter().map(|s| open(&s.source)).collect::<Result<Vec<_>>>()?;
         let aged = series.iter_mut().zip(&scene.system).filter(|(_, s)| asks_for_ages(s));
         aged.for_each(|(series, _)| series.add_ages());
         let ranges = vec![None; series.len()];
@@ -206,9 +207,8 @@ impl Session {
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
         // Lines in space are hidden by depth, and cues come from all layers.
-        let layers = layers == Layers::Yes
-            || scene.cue.any()
-            || loaded.iter().any(|l| l.sim_box.is_some());
+        let layers =
+            layers == Layers::Yes || scene.cue.any() || loaded.iter().any(|l| l.sim_box.is_some());
         let start = Instant::now();
         let raw = match self.scene.renderer {
             Renderer::Spheres => {
@@ -432,12 +432,7 @@ impl Session {
     }
 
     /// Tone, cues, background and annotations.
-    fn finish(
-        &self,
-        raw: &Frame,
-        resolved: &Resolved,
-        annotated: &Annotated<'_>,
-    ) -> Result<Frame> {
+    fn finish(&self, raw: &Frame, resolved: &Resolved, annotated: &Annotated<'_>) -> Result<Frame> {
         let image = &self.scene.image;
         let mut shown = raw.clone();
         let curve = match image.tone {

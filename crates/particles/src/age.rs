@@ -96,11 +96,7 @@ mod tests {
     fn frame(ids: &[i64], time: Option<f64>) -> Particles {
         Particles {
             positions: vec![[0.0; 3]; ids.len()],
-            columns: vec![Column::new(
-                names::PARTICLE_IDENTIFIER,
-                1,
-                Values::I64(ids.to_vec()),
-            )],
+            columns: vec![Column::new(names::PARTICLE_IDENTIFIER, 1, Values::I64(ids.to_vec()))],
             time,
             ..Particles::default()
         }
@@ -121,11 +117,8 @@ mod tests {
     #[test]
     fn a_particle_is_as_old_as_its_identifier() {
         // 7 leaves and comes back; 9 is born in frame 1, 3 in frame 2; the order changes.
-        let frames = [
-            frame(&[5, 7], Some(1.0)),
-            frame(&[9, 5], Some(1.5)),
-            frame(&[7, 3, 9, 5], Some(4.0)),
-        ];
+        let frames =
+            [frame(&[5, 7], Some(1.0)), frame(&[9, 5], Some(1.5)), frame(&[7, 3, 9, 5], Some(4.0))];
         let mut ages = Ages::default();
         assert_eq!(ages_of(&mut ages, 2, &frames), (vec![3.0, 0.0, 2.5, 3.0], vec![0, 1]));
         // Each frame is looked at once; going back makes nobody older or younger.

@@ -283,6 +283,9 @@ fn ages_are_known_over_files_and_only_where_they_are_wanted() {
     };
     // Frames 0, 1, 2 hold the particles below 0, 1, 2; frames 3 and 4 those below 100 and 101.
     let last = ages(4);
-    assert_eq!((last.len(), &last[..3], last[99], last[100]), (101, &[3.0, 2.0, 1.0][..], 1.0, 0.0));
+    assert_eq!(
+        (last.len(), &last[..3], last[99], last[100]),
+        (101, &[3.0, 2.0, 1.0][..], 1.0, 0.0)
+    );
     assert_eq!(ages(2), [1.0, 0.0]);
 }

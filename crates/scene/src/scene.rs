@@ -489,7 +489,9 @@ impl From<ColorBy> for String {
 
 impl Setting for ColorBy {
     fn shape() -> Shape {
-        Shape::Value("auto, uniform, element, type, chain, residue, or the name of a property".into())
+        Shape::Value(
+            "auto, uniform, element, type, chain, residue, or the name of a property".into(),
+        )
     }
 }
 

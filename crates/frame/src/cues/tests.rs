@@ -14,7 +14,8 @@ struct Ball([f32; 2], f32, f32);
 /// Balls in parallel projection, white, with pixels as world units.
 fn picture(balls: &[Ball], size: [usize; 2]) -> Frame {
     let [width, height] = size;
-    let (mut depth, mut normal) = (vec![f32::INFINITY; width * height], vec![[0.0; 3]; width * height]);
+    let (mut depth, mut normal) =
+        (vec![f32::INFINITY; width * height], vec![[0.0; 3]; width * height]);
     let (mut id, mut color) = (vec![-1i64; width * height], vec![[0.0; 4]; width * height]);
     for (at, depth) in depth.iter_mut().enumerate() {
         let p = [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5];
@@ -205,7 +206,8 @@ fn planes_have_no_lines_no_halos_and_no_rims() {
         ..cues()
     };
     let length = (1.0f32 + 4.0 + 1.0).sqrt();
-    let tilted = wall(|x, y| 100.0 + x + 2.0 * y * 0.5, [1.0 / length, -2.0 / length, -1.0 / length]);
+    let tilted =
+        wall(|x, y| 100.0 + x + 2.0 * y * 0.5, [1.0 / length, -2.0 / length, -1.0 / length]);
     for frame in [wall(|_, _| 50.0, [0.0, 0.0, -1.0]), tilted] {
         let dark = darkness(&all, frame);
         let worst = dark.iter().fold(0.0, |a: f32, b| a.max(*b));
@@ -214,7 +216,7 @@ fn planes_have_no_lines_no_halos_and_no_rims() {
 }
 
 #[test]
-fn depth_fades_with_the_square_of_distance() {
+fn depth_fades_into_the_background_or_towards_a_color() {
     let fade = |color| Some(Fade { strength: 0.8, color });
     let faded = |color, distance: f32| {
         let mut frame = wall(|_, _| distance, [0.0, 0.0, -1.0]);
@@ -226,8 +228,9 @@ fn depth_fades_with_the_square_of_distance() {
     let end = faded(None, 400.0);
     assert!((end[3] - 0.2).abs() < 1e-6 && end == [end[3]; 4]);
     assert_eq!(faded(None, 900.0), end);
-    let dark = faded(Some([0.0; 3]), 400.0);
-    assert!((dark[0] - 0.2).abs() < 1e-6 && dark[3] == 1.0);
+    let dark = |distance| faded(Some([0.0; 3]), distance);
+    assert!((dark(400.0)[0] - 0.2).abs() < 1e-6 && dark(400.0)[3] == 1.0);
+    assert!((dark(200.0)[0] - 0.6).abs() < 1e-6);
     // What is nowhere stays: the surroundings of a liquid.
     assert_eq!(faded(None, f32::INFINITY), [1.0; 4]);
 }
