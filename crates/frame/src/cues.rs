@@ -7,7 +7,7 @@
 //!
 //! - **rim**: ρ(sin θ), θ being the angle between ray and normal: sphere by sphere, as the paper's sprites;
 //! - **halo**: how much of the surroundings is nearer by more than a structure: dark behind what is before;
-//! - **depth**: what is far fades, linearly in its distance;
+//! - **depth**: what is far fades into the background or towards a colour;
 //! - **edges**: lines where what is behind is farther by more than a structure: where structures end;
 //! - **seam**: lines where one surface goes through another.
 //!
@@ -137,7 +137,8 @@ impl Cues {
         let [near, far] = self.range;
         let Some(depth) = self.depth else { return 0.0 };
         let t = ((distance - near) / (far - near).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        depth.strength * t * t
+        // A little of a bright background shows at once, a little of the dark hardly.
+        depth.strength * if depth.color.is_none() { t * t } else { t }
     }
 }
 

@@ -104,7 +104,7 @@ impl Lines {
         let start = row * width;
         let all = cues.any_particle();
         let least = 0.5 * cues.structure;
-        let flags = &mut self.flags[start..start + width];
+        let flags = &mut self.flags[start..][..width];
         let (here, key) = (&patch.distance[start..][..width], &patch.key[start..][..width]);
         let mut any = 0;
         for x in 0..width - 1 {

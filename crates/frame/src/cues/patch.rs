@@ -123,7 +123,7 @@ impl Patch {
     #[inline(always)]
     fn look_at<S: Simd>(&mut self, _: S, row: usize, (layers, eye): (&Layers<'_>, &Eye)) {
         let width = self.columns.len();
-        let place = row * width..(row + 1) * width;
+        let at = row * width;
         let (x, y) = (self.columns.start, self.rows.start + row);
         let middle = [0.5 * layers.size[0] as f32, 0.5 * layers.size[1] as f32];
         // The rays go a to the right and b upward for each unit forward.
@@ -131,9 +131,9 @@ impl Patch {
         let (first, b) = (x as f32 + 0.5 - middle[0], (middle[1] - y as f32 - 0.5) * step);
         let (constant, growing) = if eye.perspective { (0.0, eye.pixel) } else { (eye.pixel, 0.0) };
         let normals = &layers.normal[y * layers.size[0] + x..][..width];
-        let (right, down) = (&mut self.right[place.clone()], &mut self.down[place.clone()]);
-        let (facing, unit) = (&mut self.facing[place.clone()], &mut self.unit[place.clone()]);
-        let distance = &self.distance[place];
+        let (right, down) = (&mut self.right[at..][..width], &mut self.down[at..][..width]);
+        let (facing, unit) = (&mut self.facing[at..][..width], &mut self.unit[at..][..width]);
+        let distance = &self.distance[at..][..width];
         for x in 0..width {
             let a = (x as i32 as f32 + first) * step;
             let shorter = 1.0 / (1.0 + a * a + b * b).sqrt();
@@ -164,13 +164,11 @@ impl Patch {
         let below = if row + 1 < self.rows.len() { start + width } else { start };
         let (weight_above, weight_below) =
             (if above < start { 1.0f32 } else { 0.0 }, if below > start { 1.0f32 } else { 0.0 });
-        let out = &mut self.curvature[start..start + width];
-        let (key, right) = (&self.key[start..start + width], &self.right[start..start + width]);
-        let down = &self.down[start..start + width];
-        let (key_above, down_above) =
-            (&self.key[above..above + width], &self.down[above..above + width]);
-        let (key_below, down_below) =
-            (&self.key[below..below + width], &self.down[below..below + width]);
+        let out = &mut self.curvature[start..][..width];
+        let (key, right) = (&self.key[start..][..width], &self.right[start..][..width]);
+        let down = &self.down[start..][..width];
+        let (key_above, down_above) = (&self.key[above..][..width], &self.down[above..][..width]);
+        let (key_below, down_below) = (&self.key[below..][..width], &self.down[below..][..width]);
         for x in 1..width - 1 {
             let before = if key[x - 1] == key[x] { 1.0 } else { 0.0 };
             let after = if key[x + 1] == key[x] { 1.0 } else { 0.0 };

@@ -216,7 +216,7 @@ fn planes_have_no_lines_no_halos_and_no_rims() {
 }
 
 #[test]
-fn depth_fades_with_the_square_of_distance() {
+fn depth_fades_into_the_background_or_towards_a_color() {
     let fade = |color| Some(Fade { strength: 0.8, color });
     let faded = |color, distance: f32| {
         let mut frame = wall(|_, _| distance, [0.0, 0.0, -1.0]);
@@ -228,8 +228,9 @@ fn depth_fades_with_the_square_of_distance() {
     let end = faded(None, 400.0);
     assert!((end[3] - 0.2).abs() < 1e-6 && end == [end[3]; 4]);
     assert_eq!(faded(None, 900.0), end);
-    let dark = faded(Some([0.0; 3]), 400.0);
-    assert!((dark[0] - 0.2).abs() < 1e-6 && dark[3] == 1.0);
+    let dark = |distance| faded(Some([0.0; 3]), distance);
+    assert!((dark(400.0)[0] - 0.2).abs() < 1e-6 && dark(400.0)[3] == 1.0);
+    assert!((dark(200.0)[0] - 0.6).abs() < 1e-6);
     // What is nowhere stays: the surroundings of a liquid.
     assert_eq!(faded(None, f32::INFINITY), [1.0; 4]);
 }

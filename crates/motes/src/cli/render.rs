@@ -18,8 +18,7 @@ Examples:
   motes render -o picture.png                        a picture, without any file
   motes render dump.lammpstrj -o out.png --color-by Velocity --colormap magma
   motes render 'out_*.vtk' -o film/%04d.png --frame all --size 1080p
-  motes render dump.lammpstrj --video turn.mp4 --turn 360
-  motes render fluid.ply walls.ply -o out.png --set system.1.color.by=uniform";
+  motes render dump.lammpstrj --video turn.mp4 --turn 360";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
