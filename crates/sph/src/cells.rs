@@ -88,7 +88,7 @@ fn cells<S: Simd>(simd: S, lattice: &Lattice, points: [&[f32]; 3], keys: &mut [u
             let most = (lattice.dims[axis] - 3) as u32;
             let along = along.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, most as f32));
             let along = along.to_int::<u32x16<S>>().min(u32x16::splat(simd, most));
-            cell = cell + (along + 1) * lattice.strides[axis] as u32;
+            cell += (along + 1) * lattice.strides[axis] as u32;
         }
         cell.store_slice(keys);
     }
