@@ -201,6 +201,10 @@ impl Session {
             ));
         }
 
+        let liquid = self.scene.renderer != Renderer::Spheres;
+        if liquid && loaded.first().is_some_and(|l| l.clip().is_some()) {
+            self.notes.push("sections: a liquid is cut by centre only; set section.cut".into());
+        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
