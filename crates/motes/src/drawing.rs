@@ -74,6 +74,13 @@ impl Drawing<'_> {
             let name = if scene.renderer == Renderer::Density { "density" } else { "surface" };
             return Err(Error::Usage(format!("renderer {name}: no system is visible")));
         };
+        if let [_, _, ..] = system.visible.passes()
+            && system.visible.passes().iter().any(|pass| pass.clip().is_some())
+        {
+            return Err(Error::Usage(
+                "section.types: a liquid is cut as a whole; expected no types, or cut = \"centre\"".into(),
+            ));
+        }
         let level = Level::new();
         stats.simd = instruction_set(level).into();
         let entries = Entries::new(others, &scene.light);
