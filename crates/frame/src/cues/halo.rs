@@ -115,10 +115,11 @@ impl Shade {
         let (above, below, v) = beside((y as f32 + 0.5) * per_pixel - 0.5, rows);
         line.resize(columns, [0.0; SLICES]);
         let cells = first / self.cell..((first + distances.len()) / self.cell + 2).min(columns);
-        for x in cells.start.saturating_sub(1)..cells.end {
+        let first_cell = cells.start.saturating_sub(1);
+        for (x, counts) in line[..cells.end].iter_mut().enumerate().skip(first_cell) {
             let above = f32x16::from_slice(simd, &self.cells[above * columns + x]);
             let below = f32x16::from_slice(simd, &self.cells[below * columns + x]);
-            (above + (below - above) * v).store_slice(&mut line[x]);
+            (above + (below - above) * v).store_slice(counts);
         }
         for (x, (halo, distance)) in halo.iter_mut().zip(distances).enumerate() {
             // Counted from the slice before the first, in which nothing is.
