@@ -149,7 +149,7 @@ impl Stretches {
         }
     }
 
-    /// Finds the gap of a clause of several faces; one that is none gets no length.
+    /// Finds the gap of a clause of several faces; one that is none lies nowhere.
     #[inline(always)]
     fn gap<S: Simd>(
         &mut self,
@@ -173,6 +173,8 @@ impl Stretches {
             let within = slope.simd_eq(zero) & height.simd_ge(zero);
             high = within.select(-infinity, high);
         }
+        let some = low.simd_lt(high);
+        let (low, high) = (some.select(low, infinity), some.select(high, -infinity));
         let rows = &mut self.gaps[union * ROWS * LANES..(union + 1) * ROWS * LANES];
         store(rows, [low, cap, high, back]);
     }
