@@ -9,7 +9,9 @@ use motes_frame::{Background, Curve, Frame, Layer, Tone};
 use motes_grid::RadiusClasses;
 use motes_particles::read::{Wanted, names};
 use motes_particles::{Particles, Series};
-use motes_scene::{Bounds, CapColor, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Section, Show};
+use motes_scene::{
+    Bounds, CapColor, ColorBy, Framing, Moment, RangeOver, Renderer, Resolved, Scene, Section, Show,
+};
 use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 
@@ -201,6 +203,10 @@ impl Session {
             ));
         }
 
+        let liquid = self.scene.renderer != Renderer::Spheres;
+        if liquid && loaded.first().is_some_and(|l| l.clip().is_some()) {
+            self.notes.push("sections: a liquid is cut by centre only; set section.cut".into());
+        }
         let boxes = framed(&loaded, origin);
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
@@ -404,7 +410,13 @@ impl Session {
         let rays = resolved.view.rays(origin);
         let lights = resolved.lights.about(origin);
         let systems = &entries.spheres;
-        let view = View { rays: &rays, systems, paint: &entries, lights: &lights, casters: &entries.casters };
+        let view = View {
+            rays: &rays,
+            systems,
+            paint: &entries,
+            lights: &lights,
+            casters: &entries.casters,
+        };
         let image = &self.scene.image;
         let settings = Settings {
             size: (image.width, image.height),

@@ -281,9 +281,8 @@ impl Body {
         let radii = equal.map_or(Radii::Each(&radii[..]), Radii::Uniform);
         let alone = RadiusClasses::build(&positions[..], radii, Params::default());
         let all: Vec<_> = alone.grids.iter().map(Visibility::all).collect();
-        let ways =
-            [Spheres::new(&self.classes, sections.visible()), Spheres::new(&alone, &all)];
-        ways.map(|spheres| self.draw(spheres, &self.poses[0]));
+        let ways = [Spheres::new(&self.classes, sections.visible()), Spheres::new(&alone, &all)];
+        ways.iter().for_each(|spheres| self.draw(*spheres, &self.poses[0]));
         found.hashes.insert("cropped", self.studio.hash());
         let mut times = [Vec::new(), Vec::new()];
         for pose in self.poses.iter().skip(1) {
