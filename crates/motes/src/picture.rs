@@ -6,8 +6,8 @@ use motes_frame::{Frame, PngOptions, Rgba8, Transparency, save, write_exr, write
 
 use motes_scene::{CameraView, Section};
 
-use crate::{Error, Result};
 use crate::stats::Stats;
+use crate::{Error, Result};
 
 /// A finished picture.
 #[derive(Clone, Debug)]

@@ -4,7 +4,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{BlockRanges, Clip, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility};
+use motes_grid::{
+    BlockRanges, Clip, Filter, Grid, Params, RadiusClasses, Resolution, Seen, Visibility,
+};
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
@@ -105,7 +107,8 @@ impl Loaded {
             liquid: scene.renderer != Renderer::Spheres && first == Some(number),
         };
         let system = &scene.system[number];
-        let visible = |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
+        let visible =
+            |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
         body.cut(scene, &mut self.passes, visible)?;
         self.merged.clear();
         if self.passes.len() > 1 {

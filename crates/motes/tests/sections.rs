@@ -54,7 +54,8 @@ fn particles_go_by_their_centres_or_by_what_is_left_of_them() {
     // Five of ten layers lie beyond y = 9; by what is left of them, none more, as 8 + 1 touches the plane.
     assert_eq!(visible(&draw(scene(&source, CENTRE))), 500);
     let at = |y: f64, cut: &str| {
-        let text = format!("[[section]]\npoint = [0, {y}, 0]\nnormal = [0, 3, 0]\ncut = \"{cut}\"\n");
+        let text =
+            format!("[[section]]\npoint = [0, {y}, 0]\nnormal = [0, 3, 0]\ncut = \"{cut}\"\n");
         draw(scene(&source, &text))
     };
     assert_eq!(visible(&at(8.5, "caps")), 600);

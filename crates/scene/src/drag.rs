@@ -101,9 +101,8 @@ mod tests {
             let (a, b) = (DVec3::new(0.5, 1.0, 2.0), DVec3::new(3.0, -1.0, 4.0));
             let [pa, pb] = [a, b].map(|p| view.project(p).unwrap());
             let at = |p: crate::Projected| DVec2::new(p.x, p.y);
-            let seen = |x: u32, _: u32| {
-                Some(if x == pa.x as u32 { pa.distance } else { pb.distance })
-            };
+            let seen =
+                |x: u32, _: u32| Some(if x == pa.x as u32 { pa.distance } else { pb.distance });
             let section = view.section_of_drag((at(pa), at(pb)), &seen).unwrap();
             assert!(section.point.distance(a) < 1e-9, "{section:?}");
             assert!(section.normal.distance((b - a).normalize()) < 1e-9);
@@ -114,7 +113,8 @@ mod tests {
     fn what_misses_takes_the_depth_of_what_is_hit() {
         for projection in ["perspective", "orthographic"] {
             let view = view(projection);
-            let ball = |x: u32, _: u32| (180..220).contains(&x).then_some(20.0 + f64::from(x) / 100.0);
+            let ball =
+                |x: u32, _: u32| (180..220).contains(&x).then_some(20.0 + f64::from(x) / 100.0);
             let (left, middle, right) =
                 (DVec2::new(20.5, 100.5), DVec2::new(190.5, 100.5), DVec2::new(390.5, 150.5));
             let drag = |from, to| view.section_of_drag((from, to), &ball).unwrap();

@@ -227,7 +227,10 @@ mod tests {
                         if let Some(example) = f.example {
                             let mut scene = Scene::default();
                             match path.rsplit_once('.') {
-                                Some((list @ ("system.filter" | "camera.keyframe" | "section"), of)) => {
+                                Some((
+                                    list @ ("system.filter" | "camera.keyframe" | "section"),
+                                    of,
+                                )) => {
                                     scene.set(list, "[{}]").unwrap();
                                     scene.set(&format!("{list}.0.{of}"), example).unwrap();
                                 }

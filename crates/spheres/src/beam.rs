@@ -128,7 +128,11 @@ impl Beam {
                 meets &= meets - 1;
                 let seen = visible.block(grid, block);
                 let run = (grid, seen, grid.particles_of(block));
-                self.run(simd, (&shape, direction), run, (&mut live, counts));
+                // What is not cut pays nothing for what is.
+                match self.cut {
+                    0 => self.run::<S, false>(simd, (&shape, direction), run, (&mut live, counts)),
+                    _ => self.run::<S, true>(simd, (&shape, direction), run, (&mut live, counts)),
+                }
                 if live == 0 {
                     return;
                 }
@@ -202,7 +206,7 @@ impl Beam {
 
     /// Culls and tests the particles of a block.
     #[inline(always)]
-    fn run<S: Simd>(
+    fn run<S: Simd, const CUT: bool>(
         &mut self,
         simd: S,
         (shape, direction): (&Shape, Vec3),
@@ -224,7 +228,8 @@ impl Beam {
                 let place = slot + may.trailing_zeros() as usize;
                 may &= may - 1;
                 let (center, radius) = (grid.center(place), grid.radius_at(place));
-                self.test(simd, (center, radius), (shape, direction), (live, counts));
+                let sphere = (center, radius);
+                self.test::<S, CUT>(simd, sphere, (shape, direction), (live, counts));
                 if *live == 0 {
                     return;
                 }
@@ -235,7 +240,7 @@ impl Beam {
 
     /// Blocks the rays that one sphere is in the way of.
     #[inline(always)]
-    fn test<S: Simd>(
+    fn test<S: Simd, const CUT: bool>(
         &mut self,
         simd: S,
         (center, radius): (Vec3, f32),
@@ -246,7 +251,7 @@ impl Beam {
         if vectors <= FEW {
             for vector in 0..vectors {
                 counts.tests += LANES as u64;
-                *live -= self.test_vector(simd, (center, radius), direction, vector);
+                *live -= self.test_vector::<S, CUT>(simd, (center, radius), direction, vector);
             }
             return;
         }
@@ -265,14 +270,14 @@ impl Beam {
                 let vector = first + meets.trailing_zeros() as usize;
                 meets &= meets - 1;
                 counts.tests += LANES as u64;
-                *live -= self.test_vector(simd, (center, radius), direction, vector);
+                *live -= self.test_vector::<S, CUT>(simd, (center, radius), direction, vector);
             }
         }
     }
 
     /// Tests a vector of rays against a sphere. Gives 1 if that blocked the last of them, else 0.
     #[inline(always)]
-    fn test_vector<S: Simd>(
+    fn test_vector<S: Simd, const CUT: bool>(
         &mut self,
         simd: S,
         (center, radius): (Vec3, f32),
@@ -292,9 +297,9 @@ impl Beam {
             f32x16::splat(simd, direction.y),
             f32x16::splat(simd, direction.z),
         ];
-        let blocked = match self.cut {
-            0 => blocks(simd, oc, d, (radius, reach)),
-            _ => self.stretches.blocks(simd, vector, (oc, d), (radius, reach)),
+        let blocked = match CUT {
+            false => blocks(simd, oc, d, (radius, reach)),
+            true => self.stretches.blocks(simd, vector, (oc, d), (radius, reach)),
         };
         if !blocked.any_true() {
             return 0;

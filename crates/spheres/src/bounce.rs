@@ -15,8 +15,8 @@ use crate::intersect::transmittance;
 use crate::lanes::Lanes;
 use crate::occlude::{Work, lift};
 use crate::packet::Packet;
-use crate::tile::TILE_RAYS;
 use crate::shade::color_of;
+use crate::tile::TILE_RAYS;
 use crate::traverse::{Counts, Met, trace, trace_through};
 
 /// Rays of a packet: 8 × 8.

@@ -151,13 +151,7 @@ impl Stretches {
 
     /// Finds the gap of a clause of several faces; one that is none lies nowhere.
     #[inline(always)]
-    fn gap<S: Simd>(
-        &mut self,
-        simd: S,
-        clause: &Clause,
-        union: usize,
-        rays: [[f32x16<S>; 3]; 2],
-    ) {
+    fn gap<S: Simd>(&mut self, simd: S, clause: &Clause, union: usize, rays: [[f32x16<S>; 3]; 2]) {
         let zero = f32x16::splat(simd, 0.0);
         let infinity = f32x16::splat(simd, f32::INFINITY);
         let (mut low, mut high, mut back, mut cap) = (-infinity, infinity, infinity, infinity);
@@ -284,10 +278,7 @@ pub(crate) fn cap_normals<S: Simd>(
     for face in clip.faces().filter(|face| face.cut == Cut::Caps) {
         let (at, slope, _) = crossing(simd, face, rays);
         let own = left & at.simd_eq(distance);
-        let sign = slope.simd_gt(zero).select(
-            f32x16::splat(simd, -1.0),
-            f32x16::splat(simd, 1.0),
-        );
+        let sign = slope.simd_gt(zero).select(f32x16::splat(simd, -1.0), f32x16::splat(simd, 1.0));
         for axis in 0..3 {
             normal[axis] = own.select(sign * face.plane.normal[axis], normal[axis]);
         }

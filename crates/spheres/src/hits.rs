@@ -201,8 +201,10 @@ impl Hits {
         for (system, spheres) in systems.iter().enumerate() {
             let Some(clip) = spheres.clip else { continue };
             let of = &rays.hit_system[lanes.clone()];
-            let own = (0..LANES).filter(|lane| usize::from(of[*lane]) == system);
-            let own = own.fold(0u64, |own, lane| own | 1 << lane) & u64::from(hit);
+            let own = match systems.len() {
+                1 => u64::from(hit),
+                _ => of_system(of, system as u16) & u64::from(hit),
+            };
             if own == 0 {
                 continue;
             }
@@ -279,6 +281,12 @@ impl Hits {
             system: rays.hit_system[ray],
         }
     }
+}
+
+/// Which of sixteen hits are of one system.
+fn of_system(systems: &[u16], system: u16) -> u64 {
+    let same = systems.iter().enumerate().map(|(lane, s)| u64::from(*s == system) << lane);
+    same.fold(0, |all, bit| all | bit)
 }
 
 /// The particles at four slots of a grid; where there is none, its last.

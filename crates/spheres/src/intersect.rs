@@ -176,6 +176,19 @@ pub(crate) fn dim<S: Simd>(
     sphere: Sphere,
     depth_of: &dyn Fn(u32) -> u32,
 ) -> bool {
+    match packet.clipped {
+        false => dim_rays::<S, false>(simd, packet, sphere, depth_of),
+        true => dim_rays::<S, true>(simd, packet, sphere, depth_of),
+    }
+}
+
+#[inline(always)]
+fn dim_rays<S: Simd, const CLIPPED: bool>(
+    simd: S,
+    packet: &mut Packet,
+    sphere: Sphere,
+    depth_of: &dyn Fn(u32) -> u32,
+) -> bool {
     let center = sphere.center;
     let cx = f32x16::splat(simd, center.x);
     let cy = f32x16::splat(simd, center.y);
@@ -192,7 +205,7 @@ pub(crate) fn dim<S: Simd>(
         let oy = cy - load(simd, &packet.origin[1], first);
         let oz = cz - load(simd, &packet.origin[2], first);
         let (oc, direction) = ([ox, oy, oz], [dx, dy, dz]);
-        let (distance, hit) = match packet.clipped {
+        let (distance, hit) = match CLIPPED {
             false => meet(simd, oc, direction, r2),
             true => packet.stretches.meet(simd, first / LANES, (oc, direction), r2),
         };

@@ -90,9 +90,10 @@ pub fn surfaces(
         for (j, face) in clause.iter().enumerate().filter(|(_, face)| face.caps) {
             let t = (face.offset - face.normal.dot(origin)) / face.normal.dot(direction);
             let others = |own: &[Vec<Face>], but: usize| {
-                own.iter().enumerate().filter(|(at, _)| *at != but).all(|(_, c)| {
-                    c.iter().any(|face| face.normal.dot(at(t)) >= face.offset)
-                })
+                own.iter()
+                    .enumerate()
+                    .filter(|(at, _)| *at != but)
+                    .all(|(_, c)| c.iter().any(|face| face.normal.dot(at(t)) >= face.offset))
             };
             let beside = clause.iter().enumerate().filter(|(at, _)| *at != j);
             let mut beside = beside.map(|(_, face)| face.normal.dot(at(t)) >= face.offset);

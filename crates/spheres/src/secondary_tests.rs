@@ -78,8 +78,7 @@ fn blocked_by_rest(ray: Ray, spheres: &[reference::Sphere], clip: &Clip) -> Opti
     let judge = |sphere: &reference::Sphere, clauses: &[Vec<reference::Face>], more: f64| {
         let starts_in = o.distance(sphere.center) < sphere.radius && reference::keeps(clauses, o);
         let within = |(t, _): &(f64, _)| *t < f64::from(ray.reach) + more;
-        (solid && starts_in)
-            || reference::surfaces((o, d), *sphere, clauses).iter().any(within)
+        (solid && starts_in) || reference::surfaces((o, d), *sphere, clauses).iter().any(within)
     };
     let slack = 1e-5;
     let variants: Vec<_> = [-slack, 0.0, slack].iter().map(|s| faces(clip, *s)).collect();

@@ -75,17 +75,18 @@ pub(crate) fn shade<S: Simd>(
 ) {
     let lights = view.lights;
     let one_system = view.systems.len() == 1;
-    let uniform = if one_system && !hits.capped { view.paint.uniform(0) } else { None };
+    let uniform = if one_system { view.paint.uniform(0) } else { None };
     let half = f32x16::splat(simd, 0.5);
     let sky = lights.sky - lights.ground;
     for block in (0..TILE_RAYS / LANES).filter(|block| hits.mask[*block] != 0) {
         let lanes = block * LANES..(block + 1) * LANES;
         let mut albedo = [[0.0; LANES]; 3];
+        let capped = hits.capped && hits.cap[lanes.clone()].iter().any(|cap| *cap > 0);
         match uniform {
-            Some(color) => {
+            Some(color) if !capped => {
                 albedo = [[color.x; LANES], [color.y; LANES], [color.z; LANES]];
             }
-            None => {
+            _ => {
                 let mut left = hits.mask[block];
                 while left != 0 {
                     let lane = left.trailing_zeros() as usize;

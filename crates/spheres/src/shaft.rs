@@ -256,10 +256,14 @@ impl Bundle {
                 let Some(frustum) = cone.frustum(origins, reach, bounds) else { continue };
                 let planes = Cull::new(simd, &frustum);
                 let far = frustum.k_end * frustum.sign;
-                let clipped = spheres.clip.is_some();
-                let of = (grid, visible, clipped);
-                let mut walk = Walk { bundle: self, cone, frustum, planes, far, of, live, counts };
-                walk.blocks(simd);
+                let bundle = &mut *self;
+                // What is not cut pays nothing for what is.
+                let mut walk =
+                    Walk { bundle, cone, frustum, planes, far, grid, visible, live, counts };
+                match spheres.clip {
+                    None => walk.blocks::<false>(simd),
+                    Some(_) => walk.blocks::<true>(simd),
+                }
                 live = walk.live;
                 if live == 0 {
                     return;
@@ -277,8 +281,8 @@ struct Walk<'a, S: Simd> {
     planes: Cull<S>,
     /// How far along K the rays look, times the sign of K.
     far: f32,
-    /// A grid, what is visible of it, and whether it is cut.
-    of: (&'a Grid, &'a Visibility, bool),
+    grid: &'a Grid,
+    visible: &'a Visibility,
     /// How many vectors have a ray that is not blocked.
     live: usize,
     counts: &'a mut Counts,
@@ -287,8 +291,8 @@ struct Walk<'a, S: Simd> {
 impl<S: Simd> Walk<'_, S> {
     /// Walks the slices of blocks, until all rays are blocked.
     #[inline(always)]
-    fn blocks(&mut self, simd: S) {
-        let grid = self.of.0;
+    fn blocks<const CUT: bool>(&mut self, simd: S) {
+        let grid = self.grid;
         let lattice = &grid.lattice;
         let radius = grid.greatest_radius;
         let [k, u, v] = self.frustum.axes;
@@ -306,7 +310,7 @@ impl<S: Simd> Walk<'_, S> {
                 for bu in u0..=u1 {
                     let mut block = [0; 3];
                     (block[k], block[u], block[v]) = (slice, bu, bv);
-                    self.block(simd, lattice.index(block));
+                    self.block::<CUT>(simd, lattice.index(block));
                     if self.live == 0 {
                         return;
                     }
@@ -317,8 +321,8 @@ impl<S: Simd> Walk<'_, S> {
 
     /// Tests the spheres of a block.
     #[inline(always)]
-    fn block(&mut self, simd: S, index: usize) {
-        let grid = self.of.0;
+    fn block<const CUT: bool>(&mut self, simd: S, index: usize) {
+        let grid = self.grid;
         let block = &grid.blocks[index];
         let [k, ..] = self.frustum.axes;
         let ahead = self.frustum.sign;
@@ -333,18 +337,18 @@ impl<S: Simd> Walk<'_, S> {
             return;
         }
         let particles = grid.particles_of(index);
-        match self.of.1.block(grid, index) {
+        match self.visible.block(grid, index) {
             Seen::Hidden => {}
-            Seen::Shown => self.run(simd, (particles.start, particles.end), None),
+            Seen::Shown => self.run::<CUT>(simd, (particles.start, particles.end), None),
             Seen::Mixed(words) => {
-                self.run(simd, (particles.start, particles.end), Some((words, particles.start)));
+                self.run::<CUT>(simd, (particles.start, particles.end), Some((words, particles.start)));
             }
         }
     }
 
     /// Culls and tests the particles `from..to`.
     #[inline(always)]
-    fn run(&mut self, simd: S, (from, to): (usize, usize), seen: Option<(&[u64], usize)>) {
+    fn run<const CUT: bool>(&mut self, simd: S, (from, to): (usize, usize), seen: Option<(&[u64], usize)>) {
         let mut slot = from;
         while slot < to {
             let count = (to - slot).min(LANES);
@@ -354,13 +358,13 @@ impl<S: Simd> Walk<'_, S> {
             }
             if may != 0 {
                 self.counts.spheres += u64::from(may.count_ones());
-                may &= cull(simd, &self.planes, &self.frustum, (self.of.0, slot), self.far);
+                may &= cull(simd, &self.planes, &self.frustum, (self.grid, slot), self.far);
             }
             while may != 0 {
                 let place = slot + may.trailing_zeros() as usize;
                 may &= may - 1;
-                let (center, radius) = (self.of.0.center(place), self.of.0.radius_at(place));
-                self.test(simd, Sphere { center, radius, slot: 0 });
+                let (center, radius) = (self.grid.center(place), self.grid.radius_at(place));
+                self.test::<CUT>(simd, Sphere { center, radius, slot: 0 });
                 if self.live == 0 {
                     return;
                 }
@@ -371,11 +375,11 @@ impl<S: Simd> Walk<'_, S> {
 
     /// Blocks the rays that one sphere is in the way of.
     #[inline(always)]
-    fn test(&mut self, simd: S, sphere: Sphere) {
+    fn test<const CUT: bool>(&mut self, simd: S, sphere: Sphere) {
         let vectors = self.bundle.vectors;
         if vectors <= FEW {
             for vector in 0..vectors {
-                self.test_vector(simd, sphere, vector);
+                self.test_vector::<CUT>(simd, sphere, vector);
             }
             return;
         }
@@ -404,13 +408,13 @@ impl<S: Simd> Walk<'_, S> {
             while meets != 0 {
                 let vector = first + meets.trailing_zeros() as usize;
                 meets &= meets - 1;
-                self.test_vector(simd, sphere, vector);
+                self.test_vector::<CUT>(simd, sphere, vector);
             }
         }
     }
 
     #[inline(always)]
-    fn test_vector(&mut self, simd: S, sphere: Sphere, vector: usize) {
+    fn test_vector<const CUT: bool>(&mut self, simd: S, sphere: Sphere, vector: usize) {
         let lanes = vector * LANES..(vector + 1) * LANES;
         let bundle = &mut *self.bundle;
         let center = sphere.center;
@@ -423,11 +427,9 @@ impl<S: Simd> Walk<'_, S> {
         let reach = load(simd, &bundle.reach, lanes.start);
         self.counts.tests += LANES as u64;
         let (oc, direction) = ([x, y, z], [dx, dy, dz]);
-        let blocks = match self.of.2 {
+        let blocks = match CUT {
             false => blocks(simd, oc, direction, (sphere.radius, reach)),
-            true => {
-                bundle.stretches.blocks(simd, vector, (oc, direction), (sphere.radius, reach))
-            }
+            true => bundle.stretches.blocks(simd, vector, (oc, direction), (sphere.radius, reach)),
         };
         if blocks.any_true() {
             let blocked = f32x16::splat(simd, LOST);

@@ -38,7 +38,12 @@ impl<'a> Spheres<'a> {
         Self { classes, visible, clip: None, continues: false }
     }
     /// The grid that holds `slot`, and the place in it. Slots count through all grids of the system.
+    #[inline]
     pub fn locate(&self, slot: u32) -> (&Grid, usize) {
+        // Most systems have one.
+        if let [grid] = &self.classes.grids[..] {
+            return (grid, slot as usize);
+        }
         let mut place = slot as usize;
         let mut grids = self.classes.grids.iter();
         let mut grid = grids.next();
@@ -71,6 +76,7 @@ impl<'a> Spheres<'a> {
     }
 
     /// A sphere's index in the file's own order.
+    #[inline]
     pub fn index(&self, slot: u32) -> u32 {
         let (grid, place) = self.locate(slot);
         grid.index(place)

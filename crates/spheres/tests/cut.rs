@@ -258,7 +258,8 @@ fn random_cuts_are_the_analytic_ones() {
 fn planes_through_centres_and_along_rays_and_spheres_are_cut_alike() {
     let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]);
     let slab = [face([0.0, 0.0, 0.25], z, Cut::Caps), face([0.0; 3], [0.0, 0.0, 1.0], Cut::Caps)];
-    let apart = [face([-0.25, 0.0, 0.0], [-1.0, 0.0, 0.0], Cut::Caps), face([0.25; 3], x, Cut::Caps)];
+    let apart =
+        [face([-0.25, 0.0, 0.0], [-1.0, 0.0, 0.0], Cut::Caps), face([0.25; 3], x, Cut::Caps)];
     let all = [
         ("through centres", clip(&[&[face([0.0, 0.0, 0.25], z, Cut::Caps)]])),
         ("open", clip(&[&[face([0.0, 0.0, 0.25], z, Cut::Open)]])),

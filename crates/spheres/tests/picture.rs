@@ -236,7 +236,8 @@ fn a_watch_can_cancel() {
     let classes = RadiusClasses::build(&positions, Radii::Uniform(0.1), Params::default());
     let visible: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
     let systems = [Spheres::new(&classes, &visible)];
-    let view = View { rays: &rays, systems: &systems, paint: &White, lights: &lights, casters: &[] };
+    let view =
+        View { rays: &rays, systems: &systems, paint: &White, lights: &lights, casters: &[] };
     assert!(render(view, settings(1), &|_, _| false).is_none());
 }
 

@@ -2,7 +2,8 @@
 
 use motes::bench::{
     Line, Source, Table, Tables, density_source, density_tables, peer_view, sections_source,
-    sections_tables, spheres_source, spheres_tables, surface_defaults, surface_source, surface_tables,
+    sections_tables, spheres_source, spheres_tables, surface_defaults, surface_source,
+    surface_tables,
 };
 use motes::{Error, Scene};
 

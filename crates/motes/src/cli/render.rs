@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motes::{
-    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Section, Session, Shot, built_in_scene,
-    is_picture, read_scene,
+    Film, FilmSettings, Layers, Moment, Picture, Scene, SceneError, Section, Session, Shot,
+    built_in_scene, is_picture, read_scene,
 };
 
 use super::frames::{Frames, numbered};
@@ -380,7 +380,9 @@ impl Args {
             scene.section.push(plane(section)?);
         }
         if look.cut.is_some() && scene.section.is_empty() {
-            return Err(Failure::usage("--cut: there is nothing to cut with; --section is a plane"));
+            return Err(Failure::usage(
+                "--cut: there is nothing to cut with; --section is a plane",
+            ));
         }
         set_flags(scene, &[("--cut", "section.cut", &look.cut)])?;
         for assignment in &self.set {
