@@ -158,6 +158,8 @@ fn while_something_moves_pictures_are_coarse_and_then_exact() {
         let picture = picture.unwrap();
         assert!(picture.coarse && !picture.exact && matches!(next, Next::After(_)));
     }
+    // A look in between forgets nothing.
+    assert!(matches!(client.draw(), (None, Next::After(_))));
     // Held still it is drawn whole, and let go it stays.
     let held = client.settle();
     drag(41.0, true);

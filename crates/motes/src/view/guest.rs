@@ -274,24 +274,24 @@ impl Guest {
         Ok((look, watch.since.elapsed()))
     }
 
-    /// Which picture comes next of a state, and whether it is the last of it.
+    /// Which picture comes next of a state, and what then; or when to look again.
     fn grade(
         &self,
         (studio, whole): (&Studio, bool),
         number: u32,
         moving: Moving,
-    ) -> Option<(Grade, Next)> {
+    ) -> std::result::Result<(Grade, Next), Next> {
         let before = studio.drawn.filter(|(drawn, _)| *drawn == number).map(|(_, grade)| grade);
-        let rests = studio.since.elapsed() >= AT_REST;
+        let rest = AT_REST.saturating_sub(studio.since.elapsed());
         let quick = studio.exact_took < AT_ONCE;
-        Some(match (before, moving) {
+        Ok(match (before, moving) {
             (None, Moving::Plays) => (Grade::Coarse, Next::Now),
-            (Some(_), Moving::Plays) => return None,
+            (Some(_), Moving::Plays) => return Err(Next::Asked),
             (None, Moving::Dragged) => (Grade::Coarse, Next::After(AT_REST)),
             (None, _) if quick => (Grade::Exact, Next::Asked),
             (None, _) => (Grade::Coarse, Next::Now),
-            (Some(Grade::Exact), _) => return None,
-            (Some(_), Moving::Dragged) if !rests => return None,
+            (Some(Grade::Exact), _) => return Err(Next::Asked),
+            (Some(_), Moving::Dragged) if !rest.is_zero() => return Err(Next::After(rest)),
             (Some(Grade::Coarse), _) if !whole && !quick => (Grade::Simple, Next::Now),
             (Some(_), _) => (Grade::Exact, Next::Asked),
         })
@@ -389,30 +389,33 @@ impl View for Guest {
             };
             (state.seen(), state.number, moving)
         };
-        let idle = Step { picture: None, next: wait.map_or(Next::Asked, Next::After) };
-        let whole = studio.pace(&scene).is_whole();
-        let Some((grade, next)) = self.grade((studio, whole), number, moving) else { return idle };
-        if studio.drawn.is_none_or(|(drawn, _)| drawn != number) {
-            studio.since = Instant::now();
-        }
-        let next = match next {
+        // What is to be done after nothing, or after the last picture.
+        let then = |next| match next {
             Next::Asked => wait.map_or(Next::Asked, Next::After),
             next => next,
         };
+        let whole = studio.pace(&scene).is_whole();
+        let (grade, next) = match self.grade((studio, whole), number, moving) {
+            Ok(one) => one,
+            Err(next) => return Step { picture: None, next: then(next) },
+        };
+        if studio.drawn.is_none_or(|(drawn, _)| drawn != number) {
+            studio.since = Instant::now();
+        }
         match self.picture(studio, (&scene, number, grade), tell) {
             Ok(made) => {
                 studio.drawn = Some((number, grade));
                 studio.learn(&scene, (grade, &made), link);
                 let playing = moving == Moving::Plays;
                 let picture = self.told((made, grade, playing), (&scene, number), tell);
-                Step { picture: Some(picture), next }
+                Step { picture: Some(picture), next: then(next) }
             }
             Err(Error::Cancelled) => Step { picture: None, next: Next::Now },
             Err(error) => {
                 studio.drawn = Some((number, Grade::Exact));
                 let text = error.to_string();
                 tell(json!({"is": "notice", "severity": "error", "text": text}));
-                idle
+                Step { picture: None, next: then(Next::Asked) }
             }
         }
     }
