@@ -78,7 +78,8 @@ impl Drawing<'_> {
             && system.visible.passes().iter().any(|pass| pass.clip().is_some())
         {
             return Err(Error::Usage(
-                "section.types: a liquid is cut as a whole; expected no types, or cut = \"centre\"".into(),
+                "section.types: a liquid is cut as a whole; expected no types, or cut = \"centre\""
+                    .into(),
             ));
         }
         let level = Level::new();

@@ -94,6 +94,8 @@ impl Stages {
         range: Option<[f64; 2]>,
     ) -> Result<Loaded> {
         let spare = self.begin(&particles);
+        // Whether particles fill the box is asked of their positions, which grids may take.
+        let sim_box = self.boxed(&particles, scene.overlay.r#box);
         let key = GridKey {
             radius: system.radius,
             scale: system.radius_scale,
@@ -122,7 +124,6 @@ impl Stages {
             liquid: Spacing::of(scene, number_of) == Spacing::Share,
         };
         let visible = self.seen(body, scene)?;
-        let sim_box = self.boxed(&particles, scene.overlay.r#box);
         let caps = self.capped((&particles, &classes), (scene, number_of), (&visible, origin))?;
         Ok(Loaded { number, particles, sim_box, classes, visible, paint, caps })
     }

@@ -43,3 +43,15 @@ fn pictures_do_not_depend_on_what_is_kept() {
     hashes.dedup();
     assert_eq!(hashes.len(), settings.len(), "the settings change nothing");
 }
+
+#[test]
+fn the_box_is_drawn_whether_particles_are_kept_or_not() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/extended.xyz");
+    let shown = |settings: &[(&str, &str)]| {
+        let mut session = session(file, settings);
+        let once = session.render_once(0, Layers::No, &Quiet).unwrap();
+        assert_eq!(session.render(0, Layers::No, &Quiet).unwrap().shown.hash(), once.shown.hash());
+        once.shown.hash()
+    };
+    assert_ne!(shown(&[]), shown(&[("overlay.box", "off"), ("overlay.legend", "auto")]));
+}
