@@ -87,25 +87,27 @@ impl Grid {
     }
 
     /// The edge of the cube that a particle deep inside has for itself: what the spacing of a liquid's particles
-    /// would be on a lattice. It is taken from how many particles lie within two median spacings of each of a few
-    /// thousand particles: of those that have more than nine in ten others, as these are not at the surface.
-    /// Never less than [`Self::median_spacing`], which is smaller the more unevenly particles lie. `None` if all lie at one point.
+    /// would be on a lattice. [`Self::median_spacing`] is smaller the more unevenly particles lie.
+    ///
+    /// Of a few thousand particles, with H two median spacings and r the distances of others,
+    /// Σ (1 − r²/H²) is 8π/15 · (H/edge)³ where there are particles all around. That of a particle that has more than nine in ten
+    /// others is taken, as these are not at the surface. `None` if all lie at one point.
     pub fn share_edge(&self) -> Option<f32> {
         let spacing = self.median_spacing()?;
         let (reach, step) = (2.0 * spacing, self.len().div_ceil(SPACING_SAMPLE).max(1));
-        let count = |slot: usize| {
-            let (point, mut count) = (self.center(slot), 0u32);
+        let crowd = |slot: usize| {
+            let (point, mut crowd) = (self.center(slot), 0.0_f32);
             self.visit_near(point, reach, |other| {
-                count += u32::from(self.center(other).distance(point) < reach);
+                let part = self.center(other).distance_squared(point) / (reach * reach);
+                crowd += (1.0 - part).max(0.0);
             });
-            count
+            crowd
         };
-        let mut counts: Vec<u32> =
-            (0..self.len()).into_par_iter().step_by(step).map(count).collect();
-        counts.sort_unstable();
-        let inside = *counts.get(counts.len() * 9 / 10)?;
-        let volume = std::f32::consts::PI * 4.0 / 3.0 * reach.powi(3);
-        Some((volume / inside.max(1) as f32).cbrt().max(spacing))
+        let mut crowds: Vec<f32> =
+            (0..self.len()).into_par_iter().step_by(step).map(crowd).collect();
+        crowds.sort_unstable_by(f32::total_cmp);
+        let inside = *crowds.get(crowds.len() * 9 / 10)?;
+        Some(reach * (8.0 / 15.0 * std::f32::consts::PI / inside.max(1.0)).cbrt())
     }
 
     /// Gives all particles the same radius, where it became known only from the grid itself.

@@ -292,9 +292,13 @@ fn nearest_distances_are_those_of_brute_force() {
     let lattice: Vec<[f32; 3]> =
         (0..1000).map(|i| [(i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32]).collect();
     assert_eq!(build(&lattice).median_spacing(), Some(1.0));
-    // A ball of radius 2 about a point of the lattice holds 27 of its points: those closer than 2.
-    let edge = (32.0 * std::f32::consts::PI / 3.0 / 27.0).cbrt();
-    assert!((build(&lattice).share_edge().unwrap() - edge).abs() < 1e-5);
+    assert!((build(&lattice).share_edge().unwrap() - 1.0).abs() < 0.01);
+    // Pairs on the lattice: the nearest is near, but each has half the room of a place.
+    let pairs: Vec<[f32; 3]> =
+        lattice.iter().flat_map(|p| [*p, [p[0] + 0.3, p[1], p[2]]]).collect();
+    let grid = build(&pairs);
+    assert!((grid.median_spacing().unwrap() - 0.3).abs() < 1e-5);
+    assert!(grid.share_edge().unwrap() > 0.4);
 }
 
 #[test]

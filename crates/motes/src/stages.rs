@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, RadiusClasses, Resolution};
-use motes_particles::{Particles, SimulationBox};
+use motes_particles::{Particles, Radius, SimulationBox};
 use motes_scene::{Bounds, Coloring, Scene, Section, Show, System};
 
 use crate::annotate::box_shown;
@@ -102,7 +102,10 @@ impl Stages {
             radii: system.radii.clone(),
             lambda: scene.spheres.lambda,
             block: scene.spheres.block,
-            spacing: Spacing::of(scene, number as usize),
+            spacing: match (system.radius, &particles.radius) {
+                (None, Radius::Unknown) => Spacing::of(scene, number as usize),
+                _ => Spacing::Nearest,
+            },
             shift: DVec3::from_array(particles.origin) - origin,
         };
         self.build(&key, spare, (&mut particles, (scene, system)));
@@ -225,20 +228,20 @@ impl Stages {
     fn seen(&mut self, body: Body<'_>, scene: &Scene) -> Result<Arc<Visible>> {
         let system = &scene.system[body.number];
         let sections = scene.sections_of(body.number).map(|(_, section)| section.clone());
-        let key = VisibleKey::of(system);
-        let cuts =
-            CutKey { sections: sections.collect(), liquid: body.liquid, origin: body.origin };
-        let had = self.visible.take().filter(|(had, ..)| *had == key);
-        let (had_cuts, mut visible) = match had {
-            Some((_, cuts, visible)) => (Some(cuts), visible),
-            None => (None, Arc::new(Visible::nothing())),
+        let sections: Vec<_> = sections.collect();
+        let liquid = body.liquid && !sections.is_empty();
+        let (key, cuts) =
+            (VisibleKey::of(system), CutKey { sections, liquid, origin: body.origin });
+        let (same, mut visible) = match &self.visible {
+            Some((had, had_cuts, visible)) if *had == key => (*had_cuts == cuts, visible.clone()),
+            _ => (false, Arc::new(Visible::nothing())),
         };
-        if had_cuts.as_ref() != Some(&cuts) {
+        if !same {
             let base =
                 |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
             Arc::make_mut(&mut visible).cut(body, scene, base)?;
+            self.visible = Some((key, cuts, visible.clone()));
         }
-        self.visible = Some((key, cuts, visible.clone()));
         Ok(visible)
     }
 

@@ -157,7 +157,12 @@ fn in_order(parts: &[Part], cells: &Cells) -> Vec<Ball> {
         of.spheres.iter().enumerate().map(ball).collect::<Vec<_>>()
     };
     let mut balls: Vec<Ball> = parts.par_iter().enumerate().flat_map_iter(of_part).collect();
-    balls.par_sort_unstable_by_key(|ball| (ball.cell, ball.home));
+    // By place within a cell, so that sums do not depend on the order of particles.
+    balls.par_sort_unstable_by(|a, b| {
+        let by = |axis: usize| a.at[axis].total_cmp(&b.at[axis]);
+        let by_place = a.cell.cmp(&b.cell).then(by(0)).then(by(1)).then(by(2));
+        by_place.then(a.home.cmp(&b.home))
+    });
     balls
 }
 

@@ -170,7 +170,18 @@ fn radii_that_nothing_tells_are_measured() {
     unknown.set_sources(&[path.to_string_lossy().into_owned()]);
     (unknown.camera.position, unknown.camera.target) = (None, None);
     let mut known = unknown.clone();
-    known.system[0].radius = Some(0.5);
+    let points: Vec<[f32; 3]> =
+        (0..1000).map(|i| [i % 10, i / 10 % 10, i / 100].map(|n| n as f32)).collect();
+    let classes = crate::radius::classes(
+        motes_grid::RadiusClasses::default(),
+        points.into(),
+        crate::radius::Rule::HalfSpacing(crate::radius::Spacing::Share),
+        1.0,
+        motes_grid::Params::default(),
+    );
+    let measured = f64::from(classes.grids[0].radius_at(0));
+    assert!((measured - 0.5).abs() < 0.005, "{measured}");
+    known.system[0].radius = Some(measured);
     assert_eq!(line(unknown, &["frame"]).hash, line(known, &["frame"]).hash);
     std::fs::remove_dir_all(&folder).unwrap();
 }
