@@ -227,7 +227,8 @@ impl Stages {
         let key = VisibleKey::of(system);
         let cuts =
             CutKey { sections: sections.collect(), liquid: body.liquid, origin: body.origin };
-        let had = self.visible.take().filter(|(had, ..)| *had == key);
+        // What another key was made for stays until there is something in its place.
+        let had = self.visible.take_if(|(had, ..)| *had == key);
         let (had_cuts, mut visible) = match had {
             Some((_, cuts, visible)) => (Some(cuts), visible),
             None => (None, Arc::new(Visible::nothing())),
@@ -313,7 +314,13 @@ mod tests {
         let first = load(&mut of, &[]);
         for (assignments, expected) in [
             (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
-            (&["overlay.box=on", "renderer=surface"], [true, true, true]),
+            (&["overlay.box=on"], [true, true, true]),
+            // Liquids measure unknown radii in another way.
+            (&["renderer=surface"], [false, false, true]),
+            (
+                &["section=[{ point = [0.5, 0.5, 0.5], normal = [1.0, 0.0, 0.0] }]"],
+                [true, false, true],
+            ),
             (&["system.where=Index < 100"], [true, false, true]),
             (&["system.filter=[{ min = 0.5 }]"], [true, false, true]),
             (&["system.color.by=Position"], [true, true, false]),
