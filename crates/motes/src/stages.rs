@@ -317,7 +317,13 @@ mod tests {
         let first = load(&mut of, &[]);
         for (assignments, expected) in [
             (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
-            (&["overlay.box=on", "renderer=surface"], [true, true, true]),
+            (&["overlay.box=on"], [true, true, true]),
+            // Liquids measure unknown radii in another way.
+            (&["renderer=surface"], [false, false, true]),
+            (
+                &["section=[{ point = [0.5, 0.5, 0.5], normal = [1.0, 0.0, 0.0] }]"],
+                [true, false, true],
+            ),
             (&["system.where=Index < 100"], [true, false, true]),
             (&["system.filter=[{ min = 0.5 }]"], [true, false, true]),
             (&["system.color.by=Position"], [true, true, false]),
