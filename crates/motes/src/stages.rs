@@ -318,8 +318,7 @@ mod tests {
         for (assignments, expected) in [
             (&["camera.fov=50", "light.preset=sun", "image.samples=9"][..], [true, true, true]),
             (&["overlay.box=on"], [true, true, true]),
-            // Liquids measure unknown radii in another way.
-            (&["renderer=surface"], [false, false, true]),
+            (&["renderer=surface"], [true, true, true]),
             (
                 &["section=[{ point = [0.5, 0.5, 0.5], normal = [1.0, 0.0, 0.0] }]"],
                 [true, false, true],
