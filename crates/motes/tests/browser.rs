@@ -54,6 +54,8 @@ fn the_viewer_in_a_browser() {
     assert!(!tests.is_empty());
     let run = Command::new(node)
         .args(["--test", "--test-reporter=spec", "--test-concurrency=1"])
+        // What a server has let go may keep Node waiting, and no test takes minutes.
+        .args(["--test-force-exit", "--test-timeout=300000"])
         .args(tests)
         .env("MOTES", env!("CARGO_BIN_EXE_motes"))
         .env("MOTES_BROWSER", folder)
