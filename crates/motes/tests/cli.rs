@@ -565,7 +565,9 @@ fn bench_of_a_density_prints_a_line_and_tables() {
     let text = succeeds(&folder, &[&size[..], &["--scale", "0.01"]].concat());
     let starts: Vec<_> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
     let table1 = ["table1:", "Dataset", "8,000", "27,000", "64,000", "125,000"];
-    assert_eq!(starts, [&table1[..], &["fig5:", "Dataset", "live", "still"]].concat(), "{text}");
+    let fig5 = ["fig5:", "Dataset", "live", "still"];
+    let mask = ["mask:", "Dataset", "27,000", "1,000,000"];
+    assert_eq!(starts, [&table1[..], &fig5, &mask].concat(), "{text}");
 }
 
 #[test]

@@ -15,10 +15,8 @@ use super::values::{count, size, threads, whole};
 
 const EXAMPLES: &str = "\
 Examples:
-  motes render -o picture.png                        a picture, without any file
   motes render dump.lammpstrj -o out.png --color-by Velocity --colormap magma
-  motes render 'out_*.vtk' -o film/%04d.png --frame all --size 1080p
-  motes render dump.lammpstrj --video turn.mp4 --turn 360";
+  motes render 'out_*.vtk' --video film.mp4 --size 1080p";
 
 /// As typed.
 #[derive(Debug, clap::Args)]
