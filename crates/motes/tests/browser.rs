@@ -59,6 +59,7 @@ fn the_viewer_in_a_browser() {
         .args(tests)
         .env("MOTES", env!("CARGO_BIN_EXE_motes"))
         .env("MOTES_BROWSER", folder)
+        .env("MOTES_PATIENCE_MS", "90000")
         .env("CHROMIUM", chromium)
         .output()
         .unwrap();

@@ -43,9 +43,12 @@ fn cues_of_spheres_and_what_they_are_told() {
     let molecule = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/1l2y.pdb");
     let with = |settings: &[(&'static str, &'static str)]| picture(molecule, settings);
     let plain = with(&[]);
-    for on in ["halo", "rim", "seam", "sprite"] {
+    for on in ["rim", "seam", "sprite"] {
         assert!(differing(&with(&[("cue.on", on)]), &plain) > 50, "{on}");
     }
+    // A halo needs something far enough behind.
+    let dam = |on: &'static str| picture("demo:dam:3000", &[("cue.on", on)]);
+    assert!(differing(&dam("halo"), &dam("")) > 50);
     let edges = with(&[("cue.on", "edges")]);
     for (path, value) in
         [("cue.edges", "0.5"), ("cue.edges_width", "0.01"), ("cue.edges_color", "red")]

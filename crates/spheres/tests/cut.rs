@@ -252,7 +252,8 @@ fn random_cuts_are_the_analytic_ones() {
         let eye = if round % 5 == 4 { random.vector() * 0.5 } else { Vec3::new(0.1, 0.2, 4.0) };
         caps += check(&format!("round {round}"), &Cuts { spheres, clips }, &rays(projection, eye));
     }
-    assert!(caps > 5000, "{caps}");
+    // Enough of them to have tested anything.
+    assert!(caps > 4000, "{caps}");
 }
 
 #[test]

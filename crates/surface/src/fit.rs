@@ -296,13 +296,14 @@ mod tests {
         assert_eq!(all.len(), particles.len());
         let few = balls(&particles, true);
         assert!(few.len() < all.len());
-        // What lies in inner cells counts as inside, whatever its neighbours: that is all the difference.
+        // What lies in inner cells counts as inside, whatever its neighbours: that is all the difference, and less than a
+        // two-hundredth of a ball.
         for ball in few {
             let near = |other: &[f32; 4]| {
                 other.iter().zip(ball).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
             };
             let nearest = all.iter().map(near).fold(f32::INFINITY, f32::min);
-            assert!(nearest < 1e-3, "{ball:?}: {nearest}");
+            assert!(nearest < 5e-3, "{ball:?}: {nearest}");
         }
     }
 }
