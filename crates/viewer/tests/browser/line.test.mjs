@@ -55,6 +55,8 @@ test('after the server stopped and started, the new address goes on with the vie
   await seen.exact();
   await seen.drag(100, 50);
   const hash = await seen.exact();
+  // The address follows when all has been at rest for a while.
+  await new Promise((resolve) => { setTimeout(resolve, 2000); });
   await until(async () => (await seen.page.evaluate('location.hash')).startsWith('#s='), 'an address');
   assert.equal(await server.stop(), 0);
   await seen.page.getByText('Motes has ended').waitFor();
