@@ -65,6 +65,8 @@ pub(crate) struct Cells {
     places: Places,
     inner: Bits,
     deep: Bits,
+    /// Cells that hold particles, as all around them do; none where these are the inner ones.
+    among: Option<Bits>,
     /// None where spray is as everything else.
     sparse: Option<Bits>,
 }
@@ -81,7 +83,8 @@ impl Cells {
         level: Level,
     ) -> Option<Self> {
         let tells_spray = params.spray != Spray::Liquid;
-        if params.cull == Cull::Off && !tells_spray || survey.count == 0 {
+        let asked = params.cull != Cull::Off || tells_spray || params.fit;
+        if !asked || survey.count == 0 {
             return None;
         }
         let edge = params.cell * survey.mean_radius;
@@ -99,9 +102,16 @@ impl Cells {
         let low = survey.low - edge;
         let places = Places::new(low, edge, dims);
         let lattice = Lattice { places, dims, filling: 0.5 * survey.mean_radius };
-        let occupied =
-            (tells_spray || params.cull == Cull::Occupancy).then(|| lattice.occupy(source, level));
+        let counts_only = !tells_spray && !params.fit && params.cull != Cull::Occupancy;
+        let occupied = (!counts_only).then(|| lattice.occupy(source, level));
         let sparse = occupied.as_ref().filter(|_| tells_spray).map(Bits::sparse);
+        let among = |occupied: &Bits| {
+            let mut occupied = occupied.clone();
+            occupied.clear_border(x as usize);
+            occupied.eroded()
+        };
+        let own = params.fit && params.cull != Cull::Occupancy;
+        let among = occupied.as_ref().filter(|_| own).map(among);
         let full = match params.cull {
             Cull::Count(least) => Some(lattice.count(source, least.clamp(1, 255) as u8, level)),
             Cull::Occupancy => occupied,
@@ -113,7 +123,7 @@ impl Cells {
             inner = full.eroded();
             deep = inner.eroded();
         }
-        Some(Self { low, edge, dims, places, inner, deep, sparse })
+        Some(Self { low, edge, dims, places, inner, deep, among, sparse })
     }
 
     /// How many cells there are, and how many are inner.
@@ -168,9 +178,9 @@ impl Cells {
         radius <= (1.0 - SLACK) * self.edge
     }
 
-    /// Whether a cell is inner.
-    pub fn is_inner(&self, cell: u32) -> bool {
-        self.inner.get(cell)
+    /// Whether a cell and all around it hold particles, whatever the rule of culling.
+    pub fn is_among(&self, cell: u32) -> bool {
+        self.among.as_ref().unwrap_or(&self.inner).get(cell)
     }
 
     /// Whether a cell is deep.
