@@ -34,21 +34,21 @@ enum Inside {
 }
 
 impl Caps {
-    /// Those of the sections that cut the system at place `number`; `diagonal` is that of what is visible.
+    /// Those of the sections that cut the system at place `number`; `diagonal` tells that of what is visible.
     ///
     /// # Errors
     /// A section names a property that is not there.
     pub fn new(
         (scene, number): (&Scene, usize),
         particles: &Arc<Particles>,
-        diagonal: f64,
+        diagonal: impl Fn() -> f64,
     ) -> Result<Self> {
         let system = &scene.system[number];
         let mut caps = Vec::new();
         for (i, section) in scene.sections_of(number).filter(|(_, s)| s.cut == Cut::Caps) {
             let inside = match &section.cap {
                 CapColor::Particle => continue,
-                CapColor::Hatched => hatched(section, diagonal),
+                CapColor::Hatched => hatched(section, &diagonal),
                 CapColor::Color(color) => Inside::Color(Vec3::from(color.linear())),
                 CapColor::Property(name) => {
                     let paint = Paint::new(particles, &colored_by(system, name), None)?;
@@ -76,11 +76,11 @@ impl Caps {
 }
 
 /// Lines at 45° in the plane.
-fn hatched(section: &Section, diagonal: f64) -> Inside {
+fn hatched(section: &Section, diagonal: impl Fn() -> f64) -> Inside {
     let normal = section.normal.normalize_or(glam::DVec3::Z).as_vec3();
     let (u, v) = normal.any_orthonormal_pair();
     let along = (u + v) * std::f32::consts::FRAC_1_SQRT_2;
-    let spacing = section.hatch.unwrap_or(diagonal / LINES) as f32;
+    let spacing = section.hatch.unwrap_or_else(|| diagonal() / LINES) as f32;
     Inside::Hatched { along, spacing: spacing.max(f32::MIN_POSITIVE) }
 }
 

@@ -8,7 +8,9 @@ use std::collections::HashMap;
 use motes_grid::{Grid, Radii, RadiusClasses};
 use motes_particles::read::names;
 use motes_particles::{Column, Particles, Radius, Values};
-use motes_scene::{Element, Renderer, Scene, System};
+use motes_scene::{Element, Scene, System};
+
+use crate::system::is_liquid;
 
 /// The radius of particles that have no neighbour to measure by.
 const LONE_RADIUS: f32 = 0.5;
@@ -36,13 +38,9 @@ pub(crate) enum Spacing {
 }
 
 impl Spacing {
-    /// That of the system at place `system`: the first one that is visible is the liquid, if anything is one.
+    /// That of the system at place `system`.
     pub fn of(scene: &Scene, system: usize) -> Self {
-        let first = scene.system.iter().position(|s| s.visible);
-        match scene.renderer {
-            Renderer::Surface | Renderer::Density if first == Some(system) => Self::Share,
-            _ => Self::Nearest,
-        }
+        if is_liquid(scene, system) { Self::Share } else { Self::Nearest }
     }
 }
 

@@ -128,8 +128,7 @@ impl Session {
     /// The scene makes no sense, or has other sources.
     pub fn set_scene(&mut self, scene: Scene) -> Result<()> {
         scene.check()?;
-        let sources = |s: &Scene| s.system.iter().map(|s| s.source.clone()).collect::<Vec<_>>();
-        if sources(&scene) != sources(&self.scene) {
+        if !same_sources(&scene, &self.scene) {
             return Err(Error::Usage(
                 "the scene has other sources than those that are open".into(),
             ));
@@ -514,7 +513,7 @@ impl Session {
 }
 
 /// Part of the picture's width that is kept free for a legend.
-pub(crate) fn free_right(scene: &Scene, loaded: &[Loaded]) -> f64 {
+fn free_right(scene: &Scene, loaded: &[Loaded]) -> f64 {
     let image = &scene.image;
     let legend = scene.overlay.legend != Show::Off
         && loaded.iter().any(|l| !matches!(l.paint.meaning, Meaning::Nothing));
@@ -550,6 +549,18 @@ pub(crate) struct Seen {
     pub boxes: Arc<Vec<Bounds>>,
     /// The point that positions in grids are about.
     pub origin: DVec3,
+}
+
+impl Seen {
+    /// What the camera of `scene` shows.
+    pub fn framing(&self, scene: &Scene) -> Framing<'_> {
+        Framing { boxes: &self.boxes, free_right: free_right(scene, &self.loaded) }
+    }
+}
+
+/// Whether two scenes have the same sources, one by one.
+pub(crate) fn same_sources(a: &Scene, b: &Scene) -> bool {
+    a.system.iter().map(|system| &system.source).eq(b.system.iter().map(|system| &system.source))
 }
 
 /// What boxes are made around.

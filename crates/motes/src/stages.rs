@@ -18,7 +18,7 @@ use crate::cut::{Body, Keep, Visible};
 use crate::memo::Same;
 use crate::paint::Paint;
 use crate::radius::Spacing;
-use crate::system::{Loaded, asks_for_positions, boxes, visibility};
+use crate::system::{Loaded, asks_for_positions, boxes, is_liquid, visibility};
 use crate::{Result, radius};
 
 /// The stages of one system.
@@ -124,7 +124,7 @@ impl Stages {
             classes: &classes,
             number: number_of,
             origin,
-            liquid: Spacing::of(scene, number_of) == Spacing::Share,
+            liquid: is_liquid(scene, number_of),
         };
         let visible = self.seen(body, scene)?;
         let caps = self.capped((&particles, &classes), (scene, number_of), (&visible, origin))?;
@@ -142,9 +142,8 @@ impl Stages {
         if self.particles.as_ref().is_some_and(|had| Arc::ptr_eq(had, particles)) {
             return RadiusClasses::default();
         }
-        let grids = self.grids.take();
-        *self = Self::default();
-        spare(grids)
+        self.forget();
+        spare(self.grids.take())
     }
 
     fn build(
@@ -257,8 +256,10 @@ impl Stages {
         match &self.caps {
             Some((had, caps)) if *had == key => Ok(caps.clone()),
             _ => {
-                let seen = boxes(classes, visible.all(), origin).into_iter().reduce(Bounds::union);
-                let diagonal = seen.map_or(1.0, |bounds| bounds.diagonal());
+                let diagonal = || {
+                    let boxes = boxes(classes, visible.all(), origin);
+                    boxes.into_iter().reduce(Bounds::union).map_or(1.0, |b| b.diagonal())
+                };
                 let caps = Arc::new(Caps::new((scene, number), particles, diagonal)?);
                 self.caps = Some((key, caps.clone()));
                 Ok(caps)

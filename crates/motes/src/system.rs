@@ -7,7 +7,7 @@ use motes_grid::{BlockRanges, Clip, Filter, Grid, RadiusClasses, Seen, Visibilit
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, CapColor, ColorBy, Scene, System};
+use motes_scene::{Bounds, CapColor, ColorBy, Renderer, Scene, System};
 use motes_spheres::Spheres;
 
 use crate::caps::Caps;
@@ -107,6 +107,12 @@ pub(crate) fn boxes(classes: &RadiusClasses, visible: &[Visibility], origin: DVe
         );
     }
     boxes
+}
+
+/// Whether the system at place `number` is seen as a liquid: the first one that is visible, if anything is.
+pub(crate) fn is_liquid(scene: &Scene, number: usize) -> bool {
+    scene.renderer != Renderer::Spheres
+        && scene.system.iter().position(|system| system.visible) == Some(number)
 }
 
 /// Sets `seen`, by index, of the particles that are `visible`.

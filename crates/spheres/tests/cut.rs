@@ -1,5 +1,7 @@
 //! Exact cuts against the analytic intersection of spheres and half-spaces: id, depth and normal.
 
+mod common;
+
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_grid::{
@@ -10,20 +12,11 @@ use motes_spheres::{
     Cap, Center, Finer, Paint, Picture, Primary, Settings, Spheres, View, reference, render,
 };
 
+use common::Random;
+
 const SIZE: (u32, u32) = (64, 64);
 
-/// A small deterministic generator (splitmix64).
-struct Random(u64);
-
 impl Random {
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-
     fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f32) as usize
     }

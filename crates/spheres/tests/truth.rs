@@ -1,22 +1,15 @@
 //! Traced packets against the definition, on easy and on adversarial scenes.
 
+mod common;
+
 use fearless_simd::{Level, dispatch};
 use glam::{DVec3, Vec3};
 use motes_grid::{Params, Radii, RadiusClasses, Resolution, Visibility};
 use motes_spheres::{Counts, Packet, Spheres, reference, trace};
 
-/// A small deterministic generator (splitmix64).
-struct Random(u64);
+use common::Random;
 
 impl Random {
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-
     fn point(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit())
     }

@@ -148,6 +148,15 @@ struct Keep<'a> {
 }
 
 impl Keep<'_> {
+    /// Whether a particle is left out, since its sphere lies within inner cells; `deep` says whether those of deep cells do.
+    #[inline(always)]
+    fn hides(&self, cells: &Cells, (cell, deep): (u32, bool), p: [f32; 3], radius: f32) -> bool {
+        match self.all_but_deep {
+            true => deep && cells.is_deep(cell),
+            false => cells.covers(cell, p, radius),
+        }
+    }
+
     /// Adds a particle in a cell to `memory[*kept]`, unless it cannot be drawn.
     #[inline(always)]
     fn add(&self, piece: &Piece<'_>, (i, cell): (usize, u32), memory: &mut Part, kept: &mut usize) {
@@ -196,7 +205,7 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
                 let i = left.trailing_zeros() as usize % BATCH;
                 left &= left - 1;
                 let (p, radius) = (piece.positions[at + i], piece.radius(at + i) * keep.scale);
-                if keep.all_but_deep || !cells.covers(numbers[i], p, radius) {
+                if !keep.hides(cells, (numbers[i], deep_hides), p, radius) {
                     keep.add(piece, (at + i, numbers[i]), memory, &mut kept);
                 }
             }
@@ -204,11 +213,7 @@ fn keep_part<S: Simd>(simd: S, keep: &Keep<'_>, piece: &Piece<'_>, memory: &mut 
         for i in whole..count {
             let (p, radius) = (piece.positions[i], piece.radius(i) * keep.scale);
             let cell = cells.cell(p);
-            let hidden = match keep.all_but_deep {
-                true => deep_hides && cells.is_deep(cell),
-                false => cells.covers(cell, p, radius),
-            };
-            if !hidden {
+            if !keep.hides(cells, (cell, deep_hides), p, radius) {
                 keep.add(piece, (i, cell), memory, &mut kept);
             }
         }

@@ -102,25 +102,23 @@ impl Cells {
         let low = survey.low - edge;
         let places = Places::new(low, edge, dims);
         let lattice = Lattice { places, dims, filling: 0.5 * survey.mean_radius };
-        let counts_only = !tells_spray && !params.fit && params.cull != Cull::Occupancy;
-        let occupied = (!counts_only).then(|| lattice.occupy(source, level));
+        let by_occupancy = params.cull == Cull::Occupancy;
+        let occupied =
+            (tells_spray || params.fit || by_occupancy).then(|| lattice.occupy(source, level));
         let sparse = occupied.as_ref().filter(|_| tells_spray).map(Bits::sparse);
-        let among = |occupied: &Bits| {
-            let mut occupied = occupied.clone();
-            occupied.clear_border(x as usize);
-            occupied.eroded()
+        let surrounded = |mut full: Bits| {
+            full.clear_border(x as usize);
+            full.eroded()
         };
-        let own = params.fit && params.cull != Cull::Occupancy;
-        let among = occupied.as_ref().filter(|_| own).map(among);
+        let among = occupied.clone().filter(|_| params.fit && !by_occupancy).map(surrounded);
         let full = match params.cull {
             Cull::Count(least) => Some(lattice.count(source, least.clamp(1, 255) as u8, level)),
             Cull::Occupancy => occupied,
             Cull::Off => None,
         };
         let (mut inner, mut deep) = (Bits::default(), Bits::default());
-        if let Some(mut full) = full {
-            full.clear_border(x as usize);
-            inner = full.eroded();
+        if let Some(full) = full {
+            inner = surrounded(full);
             deep = inner.eroded();
         }
         Some(Self { low, edge, dims, places, inner, deep, among, sparse })
@@ -134,8 +132,8 @@ impl Cells {
 
     /// Bytes it holds.
     pub fn bytes(&self) -> usize {
-        let sparse = self.sparse.as_ref().map_or(0, |s| s.bits.len());
-        (self.inner.bits.len() + self.deep.bits.len() + sparse) * 8
+        let some = self.sparse.iter().chain(&self.among).map(|s| s.bits.len()).sum::<usize>();
+        (self.inner.bits.len() + self.deep.bits.len() + some) * 8
     }
 
     /// The inner cells as cubes, each cell in one.

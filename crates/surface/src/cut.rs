@@ -117,6 +117,16 @@ struct Row {
     extended: Vec<Extended>,
 }
 
+/// Where the spans of each pixel start, and how many there are.
+fn starts(rows: &[Row]) -> Vec<u32> {
+    let mut sum = 0;
+    let ends = rows.iter().flat_map(|row| &row.counts).map(|count| {
+        sum += count;
+        sum
+    });
+    std::iter::once(0).chain(ends).collect()
+}
+
 impl Surfaces {
     /// What `clip` leaves, given about the same origin; with particles, `nearest` tells that of a cap.
     pub fn cut(&self, clip: &Clip, nearest: Nearest<'_>) -> Self {
@@ -125,13 +135,8 @@ impl Surfaces {
             .into_par_iter()
             .map(|y| self.cut_row(y * width..(y + 1) * width, clip, nearest))
             .collect();
-        let mut cut = Self { starts: vec![0], ..Self::of_nothing(self.view) };
-        let mut sum = 0;
+        let mut cut = Self { starts: starts(&rows), ..Self::of_nothing(self.view) };
         for row in rows {
-            for count in row.counts {
-                sum += count;
-                cut.starts.push(sum);
-            }
             cut.nearness.extend(row.nearness);
             cut.normals.extend(row.normals);
             cut.particles.extend(row.particles);
@@ -229,13 +234,8 @@ impl Spans {
             })
             .collect();
         let (size, near, far) = (self.size, self.near, self.far);
-        let mut cut = Self { size, near, far, starts: vec![0], ..Self::default() };
-        let mut sum = 0;
+        let mut cut = Self { size, near, far, starts: starts(&rows), ..Self::default() };
         for row in rows {
-            for count in row.counts {
-                sum += count;
-                cut.starts.push(sum);
-            }
             cut.depths.extend(row.nearness);
             cut.extended.extend(row.extended);
         }

@@ -13,9 +13,14 @@ const CODECS = ['', 'image/jpeg', 'image/png'];
 const WAITS = [0.3, 0.6, 1, 2, 4, 8];
 
 export class Connection extends EventTarget {
-  /** @param {string} token @param {string|null} view the view to take up again */
-  constructor(token, view) {
+  /**
+   * @param {string} token
+   * @param {string|null} view the view to take up again
+   * @param {() => {width: number, height: number}} size of the picture, device pixels
+   */
+  constructor(token, view, size) {
     super();
+    this.size = size;
     this.token = token;
     this.view = view;
     this.attempt = 0;
@@ -32,9 +37,10 @@ export class Connection extends EventTarget {
   }
 
   connect() {
-    const view = this.view ? `&view=${encodeURIComponent(this.view)}` : '';
+    const { width, height } = this.size();
+    const words = new URLSearchParams({ token: this.token, width: String(width), height: String(height), ...(this.view ? { view: this.view } : {}) });
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
-    const socket = new WebSocket(`${scheme}://${location.host}/ws?token=${encodeURIComponent(this.token)}${view}`);
+    const socket = new WebSocket(`${scheme}://${location.host}/ws?${words}`);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.#tell('link', { state: 'open' });
     socket.onmessage = ({ data }) => (typeof data === 'string' ? this.#heard(data) : this.#saw(data));
@@ -109,7 +115,7 @@ export class Connection extends EventTarget {
       ms: head.getFloat32(24, true),
       state: head.getUint32(28, true),
       hash: hash ? hash.toString(16).padStart(16, '0') : '',
-      blob: new Blob([data.slice(HEAD)], { type: CODECS[head.getUint8(16)] ?? '' }),
+      blob: new Blob([new Uint8Array(data, HEAD)], { type: CODECS[head.getUint8(16)] ?? '' }),
     };
     this.#tell('frame', frame);
   }

@@ -1,5 +1,7 @@
 /** @file Numbers and names as people read them. */
 
+const THOUSANDS = new Intl.NumberFormat('en');
+
 /**
  * A number with about `digits` significant digits: `0.0123`, `1.23e9`, `12,345`.
  * @param {unknown} value
@@ -24,7 +26,7 @@ export function number(value, digits = 5) {
  * @param {number} value
  * @returns {string}
  */
-export const count = (value) => Math.round(value).toLocaleString('en');
+export const count = (value) => THOUSANDS.format(Math.round(value));
 
 /**
  * A value of a property: a number, or several.

@@ -55,6 +55,7 @@ function press(canvas, down, touches) {
   if (down.button === 1) down.preventDefault();
   const how = kind(down);
   const start = within(canvas, down);
+  const height = canvas.clientHeight;
   let [last, moved] = [down, false];
   follow(down, (e) => {
     // A second finger takes over.
@@ -64,7 +65,6 @@ function press(canvas, down, touches) {
     const camera = store.camera;
     if ((!moved && !far) || !camera) return;
     moved = true;
-    const height = canvas.clientHeight;
     const [dx, dy] = [(e.clientX - last.clientX) / height, (e.clientY - last.clientY) / height];
     last = e;
     if (how === 'orbit') store.look(camera.orbit(dx * TURN, -dy * TURN), false);

@@ -9,6 +9,9 @@ import { add, dot, length, rotate, scale, sub, unit } from './vector.js';
 /** @typedef {import('./types.js').Vec3} Vec3 */
 
 class Overlay extends Part {
+  /** Width and height, pixels. @type {[number, number]} */
+  room = [0, 0];
+
   start() {
     this.svg = svg('svg', { 'aria-hidden': 'true' });
     this.planes = svg('g');
@@ -19,7 +22,11 @@ class Overlay extends Part {
     this.listen(store, 'camera measures picked section shown', () => this.#later());
     this.listen(store, 'scene', () => this.#later());
     this.listen(store, 'rubber', (e) => this.#rubber(e.detail));
-    new ResizeObserver(() => this.#later()).observe(this);
+    new ResizeObserver(([entry]) => {
+      const { width, height } = entry.contentRect;
+      this.room = [width, height];
+      this.#later();
+    }).observe(this);
   }
 
   /** Draws once before the next picture of the browser. */
@@ -35,8 +42,7 @@ class Overlay extends Part {
   #draw() {
     const camera = store.camera;
     if (!camera) return;
-    const [w, h] = [this.clientWidth, this.clientHeight];
-    this.svg.setAttribute('viewBox', `0 0 ${w} ${h}`);
+    const [w, h] = this.room;
     this.view = { camera, w, h };
     this.marks.replaceChildren(...this.#picked(camera, h), ...store.measures.map((m) => this.#measure(m)));
     // A plane that is dragged keeps its handles: they hold the pointer.
@@ -163,7 +169,7 @@ class Overlay extends Part {
   /** @param {{kind: string, from: {x: number, y: number}, to: {x: number, y: number}}|null} drag */
   #rubber(drag) {
     if (!drag) return this.rubber.replaceChildren();
-    const [w, h] = [this.clientWidth, this.clientHeight];
+    const [w, h] = this.room;
     const [x0, y0, x1, y1] = [drag.from.x * w, drag.from.y * h, drag.to.x * w, drag.to.y * h];
     if (drag.kind === 'box') {
       this.rubber.replaceChildren(svg('rect', {

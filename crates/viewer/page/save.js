@@ -14,12 +14,12 @@ class Save extends Part {
 
   async #open() {
     if (!store.resolved) return;
-    const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector('motes-stage canvas'));
+    const [seenWidth, seenHeight] = /** @type {any} */ (document.querySelector('motes-stage')).size.split('×').map(Number);
     const number = (/** @type {string} */ label, /** @type {number} */ value) => h('input', { type: 'number', min: 1, max: 32768, value, 'aria-label': label });
-    this.width = number('Width, pixels', canvas.width);
-    this.height = number('Height, pixels', canvas.height);
+    this.width = number('Width, pixels', seenWidth);
+    this.height = number('Height, pixels', seenHeight);
     this.samples = h('input', { type: 'number', min: 1, max: 4096, placeholder: 'as now', 'aria-label': 'Rays per pixel' });
-    const sizes = [['As seen', canvas.width, canvas.height], ...SIZES].map(([name, w, hh]) => h('button', { class: 'chip', onclick: () => { this.width.value = w; this.height.value = hh; } }, name));
+    const sizes = [['As seen', seenWidth, seenHeight], ...SIZES].map(([name, w, hh]) => h('button', { class: 'chip', onclick: () => { this.width.value = w; this.height.value = hh; } }, name));
     const dialog = h('dialog', { 'aria-labelledby': 'save-title', onclose: () => dialog.remove() },
       h('header', {}, h('h2', { id: 'save-title' }, 'Save'), h('form', { method: 'dialog' }, h('button', { class: 'plain icon', 'aria-label': 'Close', title: 'Close' }, icon('close')))),
       h('section', {}, h('h3', {}, 'Picture'),

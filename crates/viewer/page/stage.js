@@ -8,24 +8,30 @@ import './card.js';
 
 /** More pixels than this are not asked for: width × height. */
 const MOST_PIXELS = 3840 * 2160;
+/** Milliseconds that words under the picture stand at least. */
+const READING = 250;
 
 class Stage extends Part {
   /** The size that was asked for, `1280×720`. */
   size = '';
   /** Times of the last pictures. @type {number[]} */
   times = [];
+  /** When the words were written last. */
+  read = 0;
   resized = quiet(60, () => this.#resize());
 
   start() {
     this.canvas = h('canvas', {
       tabindex: 0, role: 'img', 'aria-label': 'The picture. Arrow keys turn it; press ? for all keys.',
     });
-    this.context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext('2d'));
+    // The browser enlarges coarse pictures while it puts the page together: quicker than to draw them larger.
+    this.context = /** @type {ImageBitmapRenderingContext} */ (this.canvas.getContext('bitmaprenderer'));
     this.readout = h('div', { class: 'readout' });
     this.hint = h('div', { class: 'hint', role: 'status', hidden: true });
     this.wait = h('div', { class: 'wait' }, h('span', { class: 'ring' }), h('span', {}, 'Opening…'));
     this.replaceChildren(this.canvas, h('motes-overlay'), this.hint, this.readout, h('motes-card'), this.wait);
     gestures(this.canvas);
+    store.measure = () => this.#measure();
 
     new ResizeObserver(() => this.resized()).observe(this);
     this.listen(store, 'frame', (e) => this.#show(e.detail));
@@ -39,25 +45,28 @@ class Stage extends Part {
   }
 
   #hello() {
-    this.size = '';
     this.#resize();
     const names = store.systems.map((s) => s.name || s.source).join(', ');
     document.title = names ? `${names} – Motes` : 'Motes';
   }
 
-  /** Tells the server how large the picture is to be, in device pixels. */
-  #resize() {
+  /** How large the picture is to be, in device pixels. */
+  #measure() {
     const room = this.getBoundingClientRect();
-    if (room.width < 2 || room.height < 2) return;
-    const sharp = Math.min(devicePixelRatio || 1, Math.sqrt(MOST_PIXELS / (room.width * room.height)));
-    const width = Math.round(room.width * sharp);
-    const height = Math.round(room.height * sharp);
+    const [w, h] = [Math.max(2, room.width), Math.max(2, room.height)];
+    const sharp = Math.min(devicePixelRatio || 1, Math.sqrt(MOST_PIXELS / (w * h)));
+    const [width, height] = [Math.round(w * sharp), Math.round(h * sharp)];
     store.aspect = width / height;
+    this.size = `${width}×${height}`;
+    return { width, height };
+  }
+
+  /** Tells the server if the size has changed. */
+  #resize() {
+    const before = this.size;
+    const size = this.#measure();
     store.tell('camera');
-    const size = `${width}×${height}`;
-    if (size === this.size || !store.line?.open) return;
-    this.size = size;
-    store.ask('resize', { width, height });
+    if (this.size !== before && store.line?.open) store.ask('resize', size);
   }
 
   /** @param {import('./types.js').Frame} frame */
@@ -73,36 +82,32 @@ class Stage extends Part {
     // Decoding may overtake: an older picture is never drawn over a newer one.
     if (this.frame && frame.serial < this.frame.serial && frame.serial > 1) return picture.close();
     // A picture of another shape, made before the window changed, keeps its own.
-    let [width, height] = this.size.split('×').map(Number);
-    if (!(Math.abs((width * frame.height) / (height * frame.width) - 1) < 0.03)) [width, height] = [frame.width, frame.height];
-    if (this.canvas.width !== width || this.canvas.height !== height) {
-      this.canvas.width = width;
-      this.canvas.height = height;
+    const [width, height] = this.size.split('×').map(Number);
+    const fits = Math.abs((width * frame.height) / (height * frame.width) - 1) < 0.03;
+    this.canvas.classList.toggle('other', !fits);
+    if (this.canvas.width !== frame.width || this.canvas.height !== frame.height) {
+      this.canvas.width = frame.width;
+      this.canvas.height = frame.height;
     }
-    const context = /** @type {CanvasRenderingContext2D} */ (this.context);
-    context.imageSmoothingQuality = 'high';
-    context.drawImage(picture, 0, 0, width, height);
-    picture.close();
+    /** @type {ImageBitmapRenderingContext} */ (this.context).transferFromImageBitmap(picture);
     this.frame = frame;
     this.wait.hidden = true;
     this.canvas.dataset.serial = frame.serial;
     this.canvas.dataset.state = frame.state;
     this.canvas.dataset.hash = frame.exact ? frame.hash : '';
     this.canvas.dataset.exact = frame.exact;
-    this.#rate();
-    this.#read();
-    store.tell('shown', frame);
-  }
-
-  #rate() {
     const now = performance.now();
     this.times = [...this.times, now].filter((t) => now - t < 1000);
+    // Faster than one can read, words only cost time.
+    if (frame.exact || now - this.read > READING) this.#read();
+    store.tell('shown', frame);
   }
 
   /** What the picture is: particles, size, time. */
   #read() {
     const frame = this.frame;
     if (!frame) return;
+    this.read = performance.now();
     const particles = store.systems.reduce((n, s) => n + s.particles, 0);
     const visible = this.stats?.particles?.visible;
     const moving = this.times.length > 2 && !frame.exact;

@@ -51,7 +51,12 @@ class Store extends EventTarget {
     this.selection = null;
     /** @type {Camera|null} where the camera is while it is moved */
     this.moving = null;
+    /** Whether it is being moved. */
+    this.gliding = false;
+    this.telling = false;
     this.aspect = 16 / 9;
+    /** The size of the picture, device pixels: the stage knows it. @type {() => {width: number, height: number}} */
+    this.measure = () => ({ width: 1280, height: 720 });
     /** @type {Changes|null} changes that wait for the next picture */
     this.pending = null;
     this.inFlight = 0;
@@ -61,7 +66,7 @@ class Store extends EventTarget {
 
   /** @param {string} token @param {string|null} view */
   connect(token, view) {
-    this.line = new Connection(token, view);
+    this.line = new Connection(token, view, () => this.measure());
     this.line.addEventListener('message', (e) => this.#heard(/** @type {CustomEvent} */ (e).detail));
     this.line.addEventListener('frame', (e) => this.tell('frame', /** @type {CustomEvent} */ (e).detail));
     this.line.addEventListener('link', (e) => {
@@ -95,11 +100,23 @@ class Store extends EventTarget {
       this.state = message.state;
       this.undo = Number(message.undo ?? 0);
       this.redo = Number(message.redo ?? 0);
-      this.tell(is);
-      if (is === 'hello') this.tell('scene');
+      if (is === 'hello') {
+        this.tell('hello');
+        this.tell('scene');
+      } else if (!this.gliding) this.#sceneLater();
       this.tell('camera');
     } else if (is === 'notice') this.notice(message.text, message.severity);
     else if (is !== 'systems') this.tell(is, message);
+  }
+
+  /** Tells of the scene once before the next picture of the browser, however often it changes until then. */
+  #sceneLater() {
+    if (this.telling) return;
+    this.telling = true;
+    requestAnimationFrame(() => {
+      this.telling = false;
+      this.tell('scene');
+    });
   }
 
   /** The server's scene with what it has not answered yet. */
@@ -114,6 +131,7 @@ class Store extends EventTarget {
     this.pending = null;
     this.inFlight = 0;
     this.moving = null;
+    this.gliding = false;
   }
 
   /** @param {any} scene @param {Changes} changes */
@@ -148,7 +166,7 @@ class Store extends EventTarget {
   }
 
   /**
-   * Changes the scene. While a gesture lasts (`mark` false) only the newest state is sent, once per picture.
+   * Changes the scene. While a gesture lasts (`mark` false) only the newest state is sent, when the one before was answered.
    * @param {Changes} changes
    * @param {boolean} [mark] whether this ends the gesture: a step of undo
    * @returns {Promise<void>} an error in the server's words if it refuses
@@ -156,15 +174,11 @@ class Store extends EventTarget {
   async set(changes, mark = true) {
     this.scene = this.#with(this.scene, changes);
     this.pending = { ...this.pending, ...changes };
-    this.tell('scene');
+    // While the camera moves, panels rest.
+    if (!this.gliding) this.#sceneLater();
     if (mark) return this.#flush(true);
-    if (this.inFlight === 0 && !this.scheduled) {
-      this.scheduled = true;
-      requestAnimationFrame(() => {
-        this.scheduled = false;
-        if (this.pending && this.inFlight === 0) this.#flush(false).catch((e) => this.notice(e.message, 'error'));
-      });
-    }
+    // What comes until the answer goes with the next.
+    if (this.inFlight === 0) this.#flush(false).catch((e) => this.notice(e.message, 'error'));
   }
 
   /** As `set`, with errors as messages. @param {Changes} changes @param {boolean} [mark] */
@@ -219,6 +233,7 @@ class Store extends EventTarget {
   /** Moves the camera. @param {Camera} camera @param {boolean} mark whether the movement ends here */
   look(camera, mark) {
     this.moving = camera;
+    this.gliding = !mark;
     this.change({ ...camera.changes(), 'camera.direction': null }, mark);
     this.tell('camera');
   }

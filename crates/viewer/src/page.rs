@@ -1,15 +1,18 @@
 //! The page: the files of `page/`, in the program.
 
+use std::borrow::Cow;
+use std::sync::LazyLock;
+
 /// A file of the page.
 pub(crate) struct Asset {
     /// Its name in the folder.
     pub name: &'static str,
-    pub bytes: &'static [u8],
+    pub bytes: Cow<'static, [u8]>,
 }
 
 macro_rules! assets {
     ($($name:literal,)*) => {
-        &[$(Asset { name: $name, bytes: include_bytes!(concat!("../page/", $name)) },)*]
+        &[$(Asset { name: $name, bytes: Cow::Borrowed(include_bytes!(concat!("../page/", $name))) },)*]
     };
 }
 
@@ -65,8 +68,25 @@ const ASSETS: &[Asset] = assets![
     "where.js",
 ];
 
+const INDEX: &str = "index.html";
+
+/// The page itself. It names all its modules, so that the browser does not learn of one from another's import.
+static PAGE: LazyLock<Asset> = LazyLock::new(|| {
+    let written = ASSETS.iter().find(|asset| asset.name == INDEX).map_or(&b""[..], |a| &a.bytes);
+    let written = String::from_utf8_lossy(written);
+    let modules = ASSETS.iter().filter(|asset| asset.name.ends_with(".js"));
+    let links: String = modules
+        .map(|asset| format!("<link rel=\"modulepreload\" href=\"/page/{}\">\n", asset.name))
+        .collect();
+    let whole = written.replacen("<script", &(links + "<script"), 1);
+    Asset { name: INDEX, bytes: whole.into_bytes().into() }
+});
+
 /// The file called `name`.
 pub(crate) fn asset(name: &str) -> Option<&'static Asset> {
+    if name == INDEX {
+        return Some(&PAGE);
+    }
     ASSETS.iter().find(|asset| asset.name == name)
 }
 
@@ -114,7 +134,10 @@ mod tests {
         let index = asset("index.html").unwrap();
         assert!(index.media().starts_with("text/html"));
         assert_eq!(index.version(), index.version());
-        assert_ne!(index.version(), Asset { name: "a", bytes: b"a" }.version());
+        let other = Asset { name: "a", bytes: b"a"[..].into() };
+        assert_ne!(index.version(), other.version());
+        let page = String::from_utf8_lossy(&index.bytes);
+        assert!(page.contains("modulepreload\" href=\"/page/store.js\""));
         assert!(ASSETS.iter().all(|a| a.media() != "application/octet-stream"));
     }
 }

@@ -204,7 +204,7 @@ fn file(name: &str, headers: &HeaderMap) -> Response {
     if known {
         return (StatusCode::NOT_MODIFIED, about).into_response();
     }
-    (about, [(header::CONTENT_TYPE, asset.media())], asset.bytes).into_response()
+    (about, [(header::CONTENT_TYPE, asset.media())], &*asset.bytes).into_response()
 }
 
 type Words = BTreeMap<String, String>;
@@ -237,7 +237,11 @@ async fn connect(
         return refuse(StatusCode::SERVICE_UNAVAILABLE, "there are too many connections");
     };
     let entering = house.clone();
-    let enter = move || entering.hall.enter(words.get("view").map(String::as_str));
+    let enter = move || {
+        let visit = entering.hall.enter(words.get("view").map(String::as_str))?;
+        visit.resize(&words);
+        Ok::<_, String>(visit)
+    };
     let visit = match tokio::task::spawn_blocking(enter).await {
         Ok(Ok(visit)) => visit,
         Ok(Err(error)) => return refuse(StatusCode::SERVICE_UNAVAILABLE, &error),

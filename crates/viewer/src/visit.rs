@@ -2,7 +2,7 @@
 //! draws whenever something has changed and the client has taken what was sent before, and one that encodes
 //! a picture while the next is drawn.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -101,6 +101,17 @@ impl Visit {
         let own = visit.clone();
         thread("frames").spawn(move || drawn.iter().for_each(|drawn| own.send(&drawn)))?;
         Ok(visit)
+    }
+
+    /// Tells the view how large its pictures are to be, if `words` have a `width` and a `height`: the first
+    /// picture then has that size.
+    pub fn resize(&self, words: &BTreeMap<String, String>) {
+        let number = |name| Some((name, words.get(name)?.parse::<u64>().ok()?));
+        let Some(size) = number("width").zip(number("height")) else { return };
+        let fields = [size.0, size.1].map(|(name, value)| (name.to_owned(), value.into()));
+        let request = Request { what: "resize".into(), fields: fields.into_iter().collect() };
+        // A size that makes no sense is as none.
+        let _ = self.view.ask(&request, &|_| ());
     }
 
     /// Connects a client: it is greeted, and gets a picture. A former connection ends. Gives the

@@ -44,11 +44,7 @@ pub(super) fn answer(guest: &Guest, request: &Request, tell: &(dyn Fn(Value) + S
             return Err(Error::Usage(format!("no request is called `{other}`")));
         }
     }
-    let mut message = guest.scene_message();
-    let answer = with("state", message["state"].clone());
-    message.insert("is".into(), "scene".into());
-    tell(Value::Object(message));
-    Ok(answer)
+    Ok(with("state", guest.tell_scene(tell)))
 }
 
 fn with(name: &str, value: impl Into<Value>) -> Map<String, Value> {

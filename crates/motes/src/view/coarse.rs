@@ -4,20 +4,26 @@ use std::time::Duration;
 
 use motes_scene::{Renderer, Scene};
 
-/// What a frame may take, while something moves, with its encoding.
-const IN_TIME: Duration = Duration::from_millis(28);
+/// What a frame may take, while something moves, with its encoding. The browser needs as much of the machine
+/// again, where it runs on the same.
+const IN_TIME: f64 = 0.020;
 /// How many times smaller than the canvas pictures may be, along each side: steps, as sizes that hardly
 /// differ only flicker.
 const STEPS: [f64; 8] = [1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2, 4.0];
 /// A finer step has to be so much quicker than need be.
 const EASE: f64 = 0.85;
+/// Where much of the time does not depend on the size, this is how much longer than that part pictures take:
+/// smaller ones would be ugly, and hardly quicker.
+const FIXED: f64 = 1.4;
+/// How much of what was learnt counts with each further picture.
+const MEMORY: f64 = 0.93;
 
 /// How coarse pictures are, learnt from those before.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pace {
     step: usize,
-    /// Seconds that a picture takes for each million pixels of the canvas, at the size it had.
-    cost: Option<f64>,
+    /// What pictures took at each step: how much that counts, and the mean in seconds.
+    took: [(f64, f64); STEPS.len()],
 }
 
 impl Pace {
@@ -29,24 +35,38 @@ impl Pace {
         drawing: Duration,
         encoding: Duration,
     ) {
-        let took = drawing.as_secs_f64() / megapixels.max(1e-6) + encoding.as_secs_f64();
-        // Part of it does not depend on the size; to take it for less ends in the right place too.
-        let cost = self.cost.map_or(took, |had| had + 0.4 * (took - had));
-        self.cost = Some(cost);
-        let fits = |step: usize, time: f64| cost * canvas <= time * STEPS[step].powi(2);
-        let time = IN_TIME.as_secs_f64();
-        if !fits(self.step, time) {
-            // What is much too slow is not tried again on the way.
-            let mut all = self.step + 1..STEPS.len();
-            self.step = all.find(|step| fits(*step, 1.5 * time)).unwrap_or(STEPS.len() - 1);
-        } else if self.step > 0 && fits(self.step - 1, EASE * time) {
-            self.step -= 1;
-        }
+        let time = drawing.as_secs_f64() + encoding.as_secs_f64() * megapixels;
+        self.took.iter_mut().for_each(|(weight, _)| *weight *= MEMORY);
+        let (weight, mean) = &mut self.took[self.step];
+        *mean = (*weight * *mean + time) / (*weight + 1.0);
+        *weight += 1.0;
+        let size = |step: usize| canvas / STEPS[step].powi(2);
+        let (fixed, each) = self.cost(&size);
+        let bound = IN_TIME.max(FIXED * fixed);
+        let fits = |step: &usize| {
+            let bound = if *step < self.step { EASE * bound } else { bound };
+            fixed + each * size(*step) <= bound
+        };
+        self.step = (0..STEPS.len()).find(fits).unwrap_or(STEPS.len() - 1);
+    }
+
+    /// The time of a picture that does not depend on its size, and that of each million pixels: the line
+    /// nearest to what pictures took.
+    fn cost(&self, size: &dyn Fn(usize) -> f64) -> (f64, f64) {
+        let known = || self.took.iter().enumerate().map(|(i, (w, time))| (*w, size(i), *time));
+        let sum = |f: &dyn Fn(f64, f64) -> f64| known().map(|(w, x, y)| w * f(x, y)).sum::<f64>();
+        let (all, x, y) = (sum(&|_, _| 1.0), sum(&|x, _| x), sum(&|_, y| y));
+        let (xx, xy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));
+        let spread = all * xx - x * x;
+        // Of one size only, all is taken to depend on it.
+        let each = if spread > 1e-3 * all * xx { (all * xy - x * y) / spread } else { f64::MAX };
+        let each = each.clamp(0.0, y / x.max(1e-12));
+        ((y - each * x) / all, each)
     }
 
     /// How coarse pictures are before one was drawn: liquids take longer.
     pub fn before(renderer: Renderer) -> Self {
-        Self { step: if renderer == Renderer::Spheres { 0 } else { 4 }, cost: None }
+        Self { step: if renderer == Renderer::Spheres { 0 } else { 4 }, ..Self::default() }
     }
 
     fn divide(self) -> f64 {
@@ -98,23 +118,39 @@ mod tests {
 
     #[test]
     fn what_is_quick_is_whole_and_what_is_slow_gets_smaller() {
-        assert_eq!(settles(2 * MS, 15 * MS), 1.0);
-        // 105 ms / 2.1² = 24 ms, and 34 ms at the step before.
-        assert_eq!(settles(Duration::ZERO, 100 * MS), 2.1);
-        assert_eq!(settles(500 * MS, MS), 4.0);
+        assert_eq!(settles(2 * MS, 12 * MS), 1.0);
+        // 105 ms / 2.6² = 16 ms, and 24 ms at the step before.
+        assert_eq!(settles(Duration::ZERO, 100 * MS), 2.6);
+    }
+
+    #[test]
+    fn what_does_not_depend_on_the_size_does_not_make_pictures_small() {
+        assert_eq!(settles(500 * MS, MS), 1.0);
+        assert_eq!(settles(25 * MS, 20 * MS), 1.45);
+    }
+
+    #[test]
+    fn one_slow_picture_is_forgotten() {
+        let mut pace = Pace::default();
+        pace.learn((1.0, 1.0), 400 * MS, MS);
+        assert!(pace.divide() > 2.0);
+        for _ in 0..60 {
+            pace.learn((1.0 / pace.divide().powi(2), 1.0), 10 * MS, MS);
+        }
+        assert!(pace.is_whole());
     }
 
     #[test]
     fn a_coarse_scene_has_less_of_all_that_costs_and_the_same_view() {
         let mut scene = Scene::default();
         scene.camera.aperture = 1.0;
-        let coarse = Pace { step: 5, cost: None }.coarse(&scene);
+        let coarse = Pace { step: 5, ..Pace::default() }.coarse(&scene);
         assert_eq!((coarse.image.width, coarse.image.height), (738, 415));
         assert_eq!((coarse.image.samples, coarse.light.shadow_rays), (1, 0));
         assert!(coarse.check().is_ok());
         let camera = motes_scene::Camera { aperture: 0.0, ..scene.camera.clone() };
         assert_eq!(coarse.camera, camera);
         scene.image.width = 1;
-        assert!(Pace { step: 7, cost: None }.coarse(&scene).check().is_ok());
+        assert!(Pace { step: 7, ..Pace::default() }.coarse(&scene).check().is_ok());
     }
 }

@@ -218,10 +218,13 @@ impl Guest {
         (self.follows || !now.1).then_some(FOLLOWING)
     }
 
-    fn tell_scene(&self, tell: &(dyn Fn(Value) + Sync)) {
+    /// Tells of the scene as it stands; gives the number of its state.
+    pub fn tell_scene(&self, tell: &(dyn Fn(Value) + Sync)) -> Value {
         let mut message = self.scene_message();
+        let number = message["state"].clone();
         message.insert("is".into(), "scene".into());
         tell(Value::Object(message));
+        number
     }
 
     /// Finds out what there is to be seen, if that was let go of.
@@ -238,7 +241,7 @@ impl Guest {
     }
 
     /// The message about the scene as it stands.
-    pub fn scene_message(&self) -> Map<String, Value> {
+    fn scene_message(&self) -> Map<String, Value> {
         let state = lock(&self.state);
         let (undo, redo) = state.steps();
         let mut message = Map::new();

@@ -79,9 +79,7 @@ pub(super) fn drag(scene: &Scene, seen: &Seen, ends: [[f64; 2]; 2]) -> Result<Va
 
 /// The camera of the whole canvas, before what was seen.
 fn view_of(scene: &Scene, seen: &Seen) -> Result<CameraView> {
-    let free_right = crate::session::free_right(scene, &seen.loaded);
-    let framing = motes_scene::Framing { boxes: &seen.boxes, free_right };
-    Ok(scene.resolve_framing(framing)?.view)
+    Ok(scene.resolve_framing(seen.framing(scene))?.view)
 }
 
 /// The sphere that a ray meets first.

@@ -3,6 +3,7 @@
 use motes_scene::Scene;
 
 use super::play::Running;
+use crate::session::same_sources;
 use crate::{Error, Result};
 
 /// Changes that can be undone.
@@ -59,8 +60,7 @@ impl State {
     /// The scene makes no sense, or has other sources; nothing is changed then.
     pub fn change(&mut self, scene: Scene, ends: bool) -> Result<()> {
         scene.check()?;
-        let sources = |s: &Scene| s.system.iter().map(|s| s.source.clone()).collect::<Vec<_>>();
-        if sources(&scene) != sources(&self.scene) {
+        if !same_sources(&scene, &self.scene) {
             let message = "the sources of a view cannot change; begin another one for these";
             return Err(Error::Usage(message.into()));
         }

@@ -76,12 +76,7 @@ pub(super) fn differ(had: &Seen, seen: &Seen) -> bool {
 
 /// What the scene comes to, with what was seen last.
 pub(super) fn resolved(scene: &Scene, seen: &Seen, (frames, playing): (usize, bool)) -> Value {
-    let framing = motes_scene::Framing { boxes: &seen.boxes, free_right: 0.0 };
-    let framing = motes_scene::Framing {
-        free_right: crate::session::free_right(scene, &seen.loaded),
-        ..framing
-    };
-    let resolved = scene.resolve_framing(framing);
+    let resolved = scene.resolve_framing(seen.framing(scene));
     let resolved = resolved.as_ref().unwrap_or(&seen.resolved);
     let view = &resolved.view;
     let whole = seen.boxes.iter().copied().reduce(Bounds::union);
