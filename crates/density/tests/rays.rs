@@ -9,7 +9,7 @@ use motes_density::{
     Around, Field, Liquid, Mask, Optics, Params, Particles, Shadow, Space, View, layers, reference,
     shade,
 };
-use motes_grid::Radii;
+use motes_grid::{Clause, Clip, Cut, Face, Plane, Radii};
 use motes_scene::{Beyond, Projection, Rays, Sight, optics};
 
 const WATER: f32 = 1.33;
@@ -88,6 +88,67 @@ fn rays_meet_the_surface_where_the_definition_says() {
         }
     }
     assert!(hits > 200 && misses > 100 && missed <= 3, "{hits} {misses} {missed}");
+}
+
+/// The first place where the ray is in kept liquid, by small steps, and whether it comes to it across `plane`.
+fn first_kept(
+    field: &Field,
+    threshold: f32,
+    plane: &Plane,
+    ray: (Vec3, Vec3),
+) -> Option<(f32, bool)> {
+    const STEP: f32 = 0.001;
+    let lattice = &field.lattice;
+    let liquid = |t: f32| field.at(lattice.place(ray.0 + ray.1 * t)) >= threshold;
+    let kept = |t: f32| plane.height(ray.0 + ray.1 * t) >= 0.0;
+    let steps = (0..8000).map(|i| i as f32 * STEP);
+    let at = steps.into_iter().find(|t| liquid(*t) && kept(*t))?;
+    Some((at, !kept(at - STEP)))
+}
+
+#[test]
+fn cut_liquid_begins_at_the_plane_with_its_normal() {
+    let (positions, radius) = dam(16);
+    let particles = Particles { positions: &positions, radii: Radii::Uniform(radius), masks: None };
+    let params = Params { rough: false, ..Params::with_voxel(2.0 * radius) };
+    let (field, space) = made(&particles, &params);
+    let view = view(Vec3::new(0.5, 0.5, 0.3), 4.0, 1.9, (40, 30));
+    // Away from the eye, so that the plane opens the liquid to it.
+    let normal = DVec3::new(0.5, 0.8, -0.2);
+    let plane = Plane::new(DVec3::new(0.4, 0.3, 0.25), normal).unwrap();
+    for cut in [Cut::Caps, Cut::Open] {
+        let face = Face { plane, cut, owner: 0 };
+        let clip = Clip { clauses: vec![Clause { faces: vec![face] }] };
+        let whole = Liquid { field: &field, space: &space, clip: None, level: Level::new() };
+        let open = Liquid { clip: Some(&clip), ..whole };
+        let (mut caps, mut own, mut wrong, mut thinner) = (0, 0, 0, 0);
+        let both = layers(&open, &view).into_iter().zip(layers(&whole, &view));
+        for (i, (seen, before)) in both.enumerate() {
+            let ray = view.rays.ray((i % 40) as f32 + 0.5, (i / 40) as f32 + 0.5);
+            if seen.drop.is_some() || before.drop.is_some() {
+                continue;
+            }
+            let found = first_kept(&field, params.threshold, &plane, ray);
+            let near = |t: f32| (seen.distance - t).abs() < 0.003;
+            match found {
+                Some((t, true)) => {
+                    caps += 1;
+                    // Open cuts bend no light, but are where the liquid begins, too.
+                    let is_cap = near(t) && (seen.normal + plane.normal).length() < 1e-6;
+                    wrong += u32::from(!is_cap);
+                }
+                Some((t, false)) => {
+                    own += 1;
+                    wrong += u32::from(!near(t) || (seen.normal + plane.normal).length() < 1e-6);
+                }
+                None => wrong += u32::from(seen.distance.is_finite()),
+            }
+            assert!(seen.thickness <= before.thickness + 1e-4, "{i}");
+            thinner += u32::from(seen.thickness < before.thickness - 0.01);
+        }
+        assert!(caps > 80 && own > 20 && thinner > 80, "{caps} {own} {thinner}");
+        assert!(wrong <= 4, "{cut:?}: {wrong} of {caps} + {own}");
+    }
 }
 
 /// What an eye sees of a clear ball: reflected, and refracted twice, each with the part that goes there.

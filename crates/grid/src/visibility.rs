@@ -7,14 +7,13 @@
 
 use rayon::prelude::*;
 
-use crate::{BlockRanges, Grid};
+use crate::{BlockValues, Grid};
 
 /// A range a particle's property must lie in to be seen, both ends included.
+#[derive(Clone, Copy, Debug)]
 pub struct Filter<'a> {
-    /// The property, as a function of the particle's index in the file's order.
-    pub value: &'a (dyn Fn(u32) -> f32 + Sync),
-    /// Its range in every block of the grid.
-    pub ranges: &'a BlockRanges,
+    /// The property, as the grid has it.
+    pub values: &'a BlockValues,
     /// Least value that is seen.
     pub min: f32,
     /// Greatest value that is seen.
@@ -24,17 +23,20 @@ pub struct Filter<'a> {
 impl Filter<'_> {
     /// Whether the range decides for a whole block: all seen, none seen, or `None` where it does not.
     fn decides(&self, block: usize) -> Option<bool> {
-        let (low, high) = self.ranges.ranges[block];
-        if high < self.min || low > self.max {
+        let range = self.values.ranges[block];
+        if range.high < self.min || range.low > self.max {
             return Some(false);
         }
-        // NaN hides in no range, so "all seen" cannot be said from the range alone.
-        None
+        let all = range.low >= self.min && range.high <= self.max && !range.gaps;
+        all.then_some(true)
     }
 
-    fn passes(&self, index: u32) -> bool {
-        let value = (self.value)(index);
-        value >= self.min && value <= self.max
+    /// Clears the bits of those of `slots` that do not pass.
+    fn clear(&self, slots: std::ops::Range<usize>, words: &mut [u64]) {
+        for (values, word) in self.values.values[slots].chunks(64).zip(words) {
+            let passes = |v: &f32| u64::from(*v >= self.min && *v <= self.max);
+            *word &= values.iter().enumerate().fold(0, |bits, (i, v)| bits | passes(v) << i);
+        }
     }
 }
 
@@ -232,28 +234,41 @@ fn state_of(
         return State::Hidden;
     }
     let crowded = grid.crowded.binary_search(&(block as u32)).is_ok();
-    if filters.is_empty() && keep.is_none() && !crowded {
+    let mut open = filters.iter().filter(|f| f.decides(block).is_none()).peekable();
+    if open.peek().is_none() && keep.is_none() && !crowded {
         return State::Shown(slots.len());
     }
-    let mut words = vec![0; slots.len().div_ceil(64)];
-    let (mut visible, mut drawn) = (0, 0);
-    let mut last_drawn: Option<usize> = None;
-    for (i, slot) in slots.clone().enumerate() {
-        let index = grid.index(slot);
-        if !filters.iter().all(|f| f.passes(index)) || !keep.is_none_or(|keep| keep(index)) {
-            continue;
+    let mut words = vec![u64::MAX; slots.len().div_ceil(64)];
+    if !slots.len().is_multiple_of(64) {
+        words[slots.len() / 64] = (1 << (slots.len() % 64)) - 1;
+    }
+    open.for_each(|filter| filter.clear(slots.clone(), &mut words));
+    let passing = |words: &[u64]| words.iter().map(|w| w.count_ones() as usize).sum::<usize>();
+    let (mut visible, mut drawn) = (passing(&words), passing(&words));
+    if keep.is_some() || crowded {
+        (visible, drawn) = (0, 0);
+        let mut last_drawn: Option<usize> = None;
+        for (i, slot) in slots.clone().enumerate() {
+            let bit = 1 << (i % 64);
+            if words[i / 64] & bit == 0 {
+                continue;
+            }
+            words[i / 64] &= !bit;
+            if !keep.is_none_or(|keep| keep(grid.index(slot))) {
+                continue;
+            }
+            visible += 1;
+            // Equal spheres of crowded cells lie side by side, the lower index first.
+            let same = |a: usize| {
+                grid.center(a) == grid.center(slot) && grid.radius_at(a) == grid.radius_at(slot)
+            };
+            if crowded && last_drawn.is_some_and(same) {
+                continue;
+            }
+            last_drawn = Some(slot);
+            drawn += 1;
+            words[i / 64] |= bit;
         }
-        visible += 1;
-        // Equal spheres of crowded cells lie side by side, the lower index first.
-        let same = |a: usize| {
-            grid.center(a) == grid.center(slot) && grid.radius_at(a) == grid.radius_at(slot)
-        };
-        if crowded && last_drawn.is_some_and(same) {
-            continue;
-        }
-        last_drawn = Some(slot);
-        drawn += 1;
-        words[i / 64] |= 1 << (i % 64);
     }
     match drawn {
         0 => State::Hidden,

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use motes_grid::{
-    BlockRanges, Filter, GROUP_EDGE, Grid, Params, Radii, RadiusClasses, Resolution, Seen,
+    BlockValues, Filter, GROUP_EDGE, Grid, Params, Radii, RadiusClasses, Resolution, Seen,
     Visibility,
 };
 
@@ -237,11 +237,11 @@ fn filters_show_what_brute_force_shows() {
     let grid = build(&positions);
     let by_x = |i: u32| positions[i as usize][0];
     let by_value = |i: u32| values[i as usize];
-    let (x_ranges, value_ranges) = (BlockRanges::of(&grid, by_x), BlockRanges::of(&grid, by_value));
+    let (x, value) = (BlockValues::of(&grid, by_x), BlockValues::of(&grid, by_value));
     for (low, high) in [(0.0, 1.0), (0.25, 0.75), (0.5, 0.5001), (2.0, 3.0), (0.9, 0.1)] {
         let filters = [
-            Filter { value: &by_x, ranges: &x_ranges, min: low, max: high },
-            Filter { value: &by_value, ranges: &value_ranges, min: 0.2, max: 0.9 },
+            Filter { values: &x, min: low, max: high },
+            Filter { values: &value, min: 0.2, max: 0.9 },
         ];
         let keep = |i: u32| !i.is_multiple_of(7);
         let visibility = Visibility::where_all(&grid, &filters, Some(&keep));

@@ -33,7 +33,7 @@ pub(crate) fn draw(
     let structure = cue.structure.unwrap_or_else(|| STRUCTURE * typical_radius(systems));
     let cues = Cues {
         eye: eye(&resolved.view),
-        range: cue.depth_range.unwrap_or(resolved.range).map(|v| v as f32),
+        range: cue.depth_range.or(resolved.range).unwrap_or_default().map(|v| v as f32),
         structure: structure as f32,
         edges: stroke("edges", (cue.edges, cue.edges_width), cue.edges_color),
         seam: stroke("seam", (cue.seam, cue.seam_width), cue.seam_color),

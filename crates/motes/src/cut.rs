@@ -19,17 +19,19 @@ pub(crate) struct Visible {
     passes: Vec<Pass>,
     /// What is visible of all passes, where there are several.
     merged: Vec<Visibility>,
+    /// Types that sections name, by the section's place, and no particle has.
+    unknown: Vec<(usize, String)>,
 }
 
 impl Visible {
     /// What passes the filters, without cuts.
     pub fn uncut(classes: &RadiusClasses, visible: Vec<Visibility>) -> Self {
-        Self { passes: vec![Pass::new(classes, (None, visible))], merged: Vec::new() }
+        Self { passes: vec![Pass::new(classes, (None, visible))], ..Self::nothing() }
     }
 
     /// What sections leave, to be cut.
     pub fn nothing() -> Self {
-        Self { passes: Vec::new(), merged: Vec::new() }
+        Self { passes: Vec::new(), merged: Vec::new(), unknown: Vec::new() }
     }
 
     /// Goes over to the sections of `scene`: made anew where other particles than before are cut alike, else the
@@ -43,7 +45,7 @@ impl Visible {
         scene: &Scene,
         visible: impl Fn(Option<Keep<'_>>) -> Result<Vec<Visibility>>,
     ) -> Result<()> {
-        body.cut(scene, &mut self.passes, visible)?;
+        self.unknown = body.cut(scene, &mut self.passes, visible)?;
         self.merged.clear();
         if self.passes.len() > 1 {
             let mut seen = vec![false; body.particles.len()];
@@ -74,6 +76,11 @@ impl Visible {
             [pass] => pass.clip(),
             _ => None,
         }
+    }
+
+    /// Types that sections name, by the section's place, and no particle has.
+    pub fn unknown(&self) -> &[(usize, String)] {
+        &self.unknown
     }
 
     /// Bytes of all parts.
@@ -145,6 +152,7 @@ impl Body<'_> {
 
     /// Cuts `passes` as the scene says: made anew where other particles than before are cut alike, else the
     /// blocks that change alone. `visible` is what passes the filters, of all particles or of those to be kept.
+    /// Gives the types that sections name, by the section's place, and no particle has.
     ///
     /// # Errors
     /// A section cannot be, or names types where there are none; or those of `visible`.
@@ -153,8 +161,8 @@ impl Body<'_> {
         scene: &Scene,
         passes: &mut Vec<Pass>,
         visible: impl Fn(Option<Keep<'_>>) -> Result<Vec<Visibility>>,
-    ) -> Result<()> {
-        let (kind_of, scopes) = self.scopes(scene)?;
+    ) -> Result<Vec<(usize, String)>> {
+        let Scopes { kind_of, scopes, unknown } = self.scopes(scene)?;
         let same = passes.len() == scopes.len()
             && passes.iter().zip(&scopes).all(|(pass, scope)| pass.kinds == scope.kinds);
         if !same {
@@ -173,17 +181,17 @@ impl Body<'_> {
             let clip = if self.liquid { clip.of_liquid(self.margin()) } else { clip };
             pass.sections.set(&self.classes.grids, clip);
         }
-        Ok(())
+        Ok(unknown)
     }
 
     /// The kind of each particle, where that matters, and which sections cut which kinds.
-    fn scopes<'a>(&self, scene: &'a Scene) -> Result<(Vec<u32>, Vec<Scope<'a>>)> {
+    fn scopes<'a>(&self, scene: &'a Scene) -> Result<Scopes<'a>> {
         let sections: Vec<(usize, &Section)> = scene.sections_of(self.number).collect();
         let Some((first, _)) = sections.iter().find(|(_, s)| !s.types.0.is_empty()) else {
-            return Ok((Vec::new(), vec![Scope { kinds: None, sections }]));
+            return Ok(Scopes::all(sections));
         };
         if self.particles.is_empty() {
-            return Ok((Vec::new(), vec![Scope { kinds: None, sections: Vec::new() }]));
+            return Ok(Scopes::all(Vec::new()));
         }
         let types = category_column(self.particles, &[names::PARTICLE_TYPE])
             .map_err(|e| Error::Usage(format!("section.{first}.types: {e}")))?;
@@ -206,7 +214,29 @@ impl Body<'_> {
         if let [all] = &mut scopes[..] {
             all.kinds = None;
         }
-        Ok((kind_of, scopes))
+        let of_section = |(i, s): &(usize, &Section)| {
+            let unknown = s.types.0.iter().filter(|name| !names.contains(name));
+            unknown.map(|name| (*i, name.clone())).collect::<Vec<_>>()
+        };
+        let unknown = sections.iter().flat_map(of_section).collect();
+        Ok(Scopes { kind_of, scopes, unknown })
+    }
+}
+
+/// Which sections cut which kinds.
+struct Scopes<'a> {
+    /// The kind of each particle, where that matters.
+    kind_of: Vec<u32>,
+    scopes: Vec<Scope<'a>>,
+    /// Types that sections name, by the section's place, and no particle has.
+    unknown: Vec<(usize, String)>,
+}
+
+impl<'a> Scopes<'a> {
+    /// All kinds are cut by the same sections.
+    fn all(sections: Vec<(usize, &'a Section)>) -> Self {
+        let scopes = vec![Scope { kinds: None, sections }];
+        Self { kind_of: Vec::new(), scopes, unknown: Vec::new() }
     }
 }
 

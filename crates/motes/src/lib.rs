@@ -22,6 +22,7 @@ mod drawing;
 mod entries;
 mod environment;
 mod error;
+mod grids;
 mod info;
 mod liquid;
 mod memo;

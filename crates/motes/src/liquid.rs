@@ -425,7 +425,8 @@ impl Liquid<'_> {
         camera.direction = Some(-key.direction.as_dvec3());
         camera.margin = 0.02;
         let size = (SHADOW_ROWS, SHADOW_ROWS);
-        let framing = motes_scene::Framing { boxes: &[bounds], free_right: 0.0 };
+        let boxes = [bounds];
+        let framing = motes_scene::Framing::new(&boxes, 0.0);
         let light = CameraView::new(&camera, framing, size);
         let view = fitted(&light, size, (bounds, self.ball()), self.origin);
         let params = Params { ids: false, ..self.params(false) };

@@ -13,6 +13,7 @@ use crate::ahead::{Ahead, All};
 use crate::annotate::{Annotated, annotations};
 use crate::cut::Visible;
 use crate::drawing::{Drawing, Kept};
+use crate::grids::SharedGrids;
 use crate::memo::Same;
 use crate::paint::Meaning;
 use crate::picture::Picture;
@@ -64,8 +65,10 @@ pub struct Session {
     ahead: Ahead<Reading>,
     /// What was made of each system's last frame.
     stages: Vec<Stages>,
+    /// Grids of each system that sessions share who share sources.
+    grids: Vec<Arc<SharedGrids>>,
     /// Boxes around what is to be framed, and what they are around.
-    framed: Option<(Vec<Framed>, Arc<Vec<Bounds>>)>,
+    framed: Option<(Vec<Framed>, Arc<Boxes>)>,
     kept: Kept,
     /// Whether the view was held for several frames.
     film: bool,
@@ -105,6 +108,7 @@ impl Session {
             last: None,
             ahead: Ahead::default(),
             stages: series.iter().map(|_| Stages::default()).collect(),
+            grids: series.iter().map(|_| Arc::default()).collect(),
             framed: None,
             kept: Kept::default(),
             film: false,
@@ -116,9 +120,11 @@ impl Session {
     }
 
     /// Another session with the same open sources and, to begin with, the same scene. Frames are read
-    /// once for both, with every column.
+    /// once for both, with every column, and grids built once.
     pub fn share(&self) -> Self {
-        Self { all_columns: true, ..Self::of(self.scene.clone(), self.series.clone()) }
+        let stages = self.grids.iter().map(|grids| Stages::beside(grids.clone())).collect();
+        let own = Self::of(self.scene.clone(), self.series.clone());
+        Self { all_columns: true, stages, grids: self.grids.clone(), ..own }
     }
 
     /// Goes on with another scene of the same sources; what does not depend on the change is not made
@@ -274,7 +280,7 @@ impl Session {
         let particles = self.read(frame, After::Kept, watch)?;
         let (loaded, origin) = self.load(particles)?;
         let boxes = self.framed(&loaded, origin);
-        let resolved = self.scene.resolve_framing(self.framing(&loaded, &boxes))?;
+        let resolved = self.scene.resolve_framing(boxes.framing(&self.scene, &loaded))?;
         Ok(Seen { loaded, resolved, boxes, origin })
     }
 
@@ -297,9 +303,10 @@ impl Session {
         let boxes = self.framed(&loaded, origin);
         stats.ms.insert("build", milliseconds(start));
         self.note_left_out(&loaded, shot.frame);
+        self.note_unknown(&loaded);
 
         let scene = self.scene_of(shot);
-        let resolved = scene.resolve_framing(self.framing(&loaded, &boxes))?;
+        let resolved = scene.resolve_framing(boxes.framing(&self.scene, &loaded))?;
         // Lines in space are hidden by depth, and cues come from all layers.
         let lines = loaded.iter().any(|l| l.sim_box.is_some());
         let quick = after == After::Moves && self.scene.renderer != Renderer::Spheres;
@@ -310,7 +317,7 @@ impl Session {
             loaded: &loaded,
             resolved: &resolved,
             origin,
-            bounds: boxes.iter().copied().reduce(Bounds::union),
+            bounds: boxes.whole,
             kept: &self.kept,
         };
         let raw = drawing.draw(layers, (&mut stats, watch))?;
@@ -330,6 +337,24 @@ impl Session {
             );
             if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
                 self.notes.push(note);
+            }
+        }
+    }
+
+    /// Tells of types that sections name and no particle has: a section that cuts nothing looks like one that
+    /// does not work.
+    fn note_unknown(&mut self, loaded: &[Loaded]) {
+        for (section, name) in loaded.iter().flat_map(|l| l.visible.unknown()) {
+            let cuts = |l: &&Loaded| {
+                self.scene.sections_of(usize::from(l.number)).any(|(i, _)| i == *section)
+            };
+            let lacks =
+                |l: &Loaded| l.visible.unknown().iter().any(|u| u == &(*section, name.clone()));
+            if loaded.iter().filter(cuts).all(lacks) {
+                let note = format!("section.{section}.types: no particle is of type '{name}'");
+                if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
+                    self.notes.push(note);
+                }
             }
         }
     }
@@ -374,18 +399,13 @@ impl Session {
             let particles = self.read(frame, After::Kept, watch)?;
             let (loaded, origin) = self.load(particles)?;
             loaded.iter().for_each(|l| l.hold_radius(&mut self.scene));
-            boxes.extend_from_slice(&self.framed(&loaded, origin));
+            boxes.extend_from_slice(&self.framed(&loaded, origin).all);
             last = loaded;
         }
-        let framing = self.framing(&last, &boxes);
+        let framing = Framing::new(&boxes, free_right(&self.scene, &last));
         self.scene.hold(framing)?;
         self.film |= frames.start() < frames.end();
         Ok(())
-    }
-
-    /// What the camera shows: all of `boxes`, beside the legend where there is one.
-    fn framing<'a>(&self, loaded: &[Loaded], boxes: &'a [Bounds]) -> Framing<'a> {
-        Framing { boxes, free_right: free_right(&self.scene, loaded) }
     }
 
     /// Builds the grids and colours of what was read, about the returned origin.
@@ -402,7 +422,7 @@ impl Session {
     }
 
     /// Boxes around all that is to be framed.
-    fn framed(&mut self, loaded: &[Loaded], origin: DVec3) -> Arc<Vec<Bounds>> {
+    fn framed(&mut self, loaded: &[Loaded], origin: DVec3) -> Arc<Boxes> {
         let key: Vec<_> = loaded.iter().map(|l| Framed::of(l, origin)).collect();
         if let Some((_, boxes)) = self.framed.as_ref().filter(|(had, _)| *had == key) {
             return boxes.clone();
@@ -412,7 +432,9 @@ impl Session {
             Bounds::of_spheres(corners.map(|c| (DVec3::from_array(c), 0.0)))
         };
         let boxes = loaded.iter().flat_map(|l| l.boxes(origin).into_iter().chain(of_box(l)));
-        let boxes = Arc::new(boxes.collect::<Vec<_>>());
+        let all: Vec<_> = boxes.collect();
+        let whole = all.iter().copied().reduce(Bounds::union);
+        let boxes = Arc::new(Boxes { all, whole });
         self.framed = Some((key, boxes.clone()));
         boxes
     }
@@ -521,6 +543,20 @@ fn free_right(scene: &Scene, loaded: &[Loaded]) -> f64 {
     if legend { LEGEND_EMS * text } else { 0.0 }
 }
 
+/// Boxes around all that is to be framed, and the one around all of them.
+pub(crate) struct Boxes {
+    all: Vec<Bounds>,
+    pub whole: Option<Bounds>,
+}
+
+impl Boxes {
+    /// What a camera shows: all of them, beside the legend where there is one.
+    fn framing(&self, scene: &Scene, loaded: &[Loaded]) -> Framing<'_> {
+        let free_right = free_right(scene, loaded);
+        Framing { boxes: &self.all, whole: self.whole, free_right }
+    }
+}
+
 /// A picture before it is finished, and what it is of.
 struct Drawn {
     raw: Frame,
@@ -528,7 +564,7 @@ struct Drawn {
     scene: Scene,
     resolved: Resolved,
     loaded: Vec<Loaded>,
-    boxes: Arc<Vec<Bounds>>,
+    boxes: Arc<Boxes>,
     origin: DVec3,
 }
 
@@ -546,7 +582,7 @@ pub(crate) struct Look {
 pub(crate) struct Seen {
     pub loaded: Vec<Loaded>,
     pub resolved: Resolved,
-    pub boxes: Arc<Vec<Bounds>>,
+    pub boxes: Arc<Boxes>,
     /// The point that positions in grids are about.
     pub origin: DVec3,
 }
@@ -554,7 +590,7 @@ pub(crate) struct Seen {
 impl Seen {
     /// What the camera of `scene` shows.
     pub fn framing(&self, scene: &Scene) -> Framing<'_> {
-        Framing { boxes: &self.boxes, free_right: free_right(scene, &self.loaded) }
+        self.boxes.framing(scene, &self.loaded)
     }
 }
 

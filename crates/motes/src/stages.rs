@@ -15,10 +15,11 @@ use motes_scene::{Bounds, Coloring, Scene, Section, Show, System};
 use crate::annotate::box_shown;
 use crate::caps::Caps;
 use crate::cut::{Body, Keep, Visible};
+use crate::grids::SharedGrids;
 use crate::memo::Same;
 use crate::paint::Paint;
 use crate::radius::Spacing;
-use crate::system::{Loaded, asks_for_positions, boxes, is_liquid, visibility};
+use crate::system::{Filtered, Loaded, asks_for_positions, boxes, is_liquid, visibility};
 use crate::{Result, radius};
 
 /// The stages of one system.
@@ -28,16 +29,20 @@ pub(crate) struct Stages {
     particles: Option<Arc<Particles>>,
     sim_box: Option<(Show, Option<SimulationBox>)>,
     grids: Option<(GridKey, Arc<RadiusClasses>)>,
+    /// Where there are others who look at the same particles.
+    shared: Option<Arc<SharedGrids>>,
     /// Whether the grids no longer know which of their particles coincide.
     forgotten: bool,
     paint: Option<(PaintKey, Arc<Paint>)>,
+    /// What filters ask for, of these grids.
+    filtered: Filtered,
     visible: Option<(VisibleKey, CutKey, Arc<Visible>)>,
     caps: Option<(CapKey, Arc<Caps>)>,
 }
 
 /// What grids depend on besides particles.
 #[derive(Clone, PartialEq)]
-struct GridKey {
+pub(crate) struct GridKey {
     radius: Option<f64>,
     scale: f64,
     radii: BTreeMap<String, f64>,
@@ -81,6 +86,11 @@ impl VisibleKey {
 }
 
 impl Stages {
+    /// Stages beside others that look at the same particles.
+    pub fn beside(shared: Arc<SharedGrids>) -> Self {
+        Self { shared: Some(shared), ..Self::default() }
+    }
+
     /// What is to be drawn of `particles` about the scene's `origin`. Of particles that nobody else holds
     /// the positions are let go once the grids hold them. Grids are built in the memory of those before.
     ///
@@ -133,8 +143,8 @@ impl Stages {
 
     /// Forgets all but the memory of the grids: other particles come.
     pub fn forget(&mut self) {
-        let grids = self.grids.take();
-        *self = Self { grids, ..Self::default() };
+        let (grids, shared) = (self.grids.take(), self.shared.take());
+        *self = Self { grids, shared, ..Self::default() };
     }
 
     /// Forgets what was made of other particles; gives the memory of their grids.
@@ -159,6 +169,12 @@ impl Stages {
             memory = spare(Some(grids));
         }
         self.particles = None;
+        (self.forgotten, self.visible) = (false, None);
+        self.filtered = Filtered::default();
+        if let Some(grids) = self.shared.as_ref().and_then(|shared| shared.find(particles, key)) {
+            self.grids = Some((key.clone(), grids));
+            return;
+        }
         let rule = radius::rule(particles, system, key.spacing);
         let params = Params {
             resolution: Resolution::CellsPerParticle(key.lambda as f32),
@@ -177,8 +193,11 @@ impl Stages {
             positions.to_mut().iter_mut().for_each(about);
         }
         let classes = radius::classes(memory, positions, rule, key.scale as f32, params);
-        self.grids = Some((key.clone(), Arc::new(classes)));
-        (self.forgotten, self.visible) = (false, None);
+        let classes = Arc::new(classes);
+        if let Some(shared) = &self.shared {
+            shared.put(particles, key.clone(), &classes);
+        }
+        self.grids = Some((key.clone(), classes));
     }
 
     fn painted(
@@ -208,8 +227,15 @@ impl Stages {
         if (forget && !some) || (!forget && !self.forgotten) {
             return;
         }
-        let shared = self.grids.as_mut().is_some_and(|(_, c)| Arc::get_mut(c).is_none());
-        if !forget || shared {
+        // Grids that are changed are nobody else's.
+        let beside = if forget { self.shared.take() } else { None };
+        if let (Some(beside), Some((_, classes))) = (&beside, &self.grids)
+            && Arc::strong_count(classes) == 1
+        {
+            beside.remove(classes);
+        }
+        let looked_at = self.grids.as_mut().is_some_and(|(_, c)| Arc::get_mut(c).is_none());
+        if !forget || looked_at {
             let had = self.particles.take();
             self.grids = None;
             self.build(key, RadiusClasses::default(), of);
@@ -221,6 +247,7 @@ impl Stages {
             classes.grids.iter_mut().for_each(|grid| grid.crowded.clear());
             (self.forgotten, self.visible) = (true, None);
         }
+        self.shared = self.shared.take().or(beside);
     }
 
     /// What is visible: where only sections have changed, by the blocks that these change alone.
@@ -236,8 +263,9 @@ impl Stages {
             _ => (false, Arc::new(Visible::nothing())),
         };
         if !same {
-            let base =
-                |keep: Option<Keep<'_>>| visibility(body.particles, body.classes, system, keep);
+            self.filtered.update(body.particles, body.classes, system)?;
+            let of = (body.particles, &self.filtered);
+            let base = |keep: Option<Keep<'_>>| visibility(of, body.classes, system, keep);
             Arc::make_mut(&mut visible).cut(body, scene, base)?;
             self.visible = Some((key, cuts, visible.clone()));
         }
@@ -371,6 +399,27 @@ mod tests {
         drop(opaque);
         assert_eq!(drawn(&load(&mut of, &["system.opacity=0.5"])), 600);
         assert_eq!(drawn(&load(&mut of, &[])), 1);
+    }
+
+    #[test]
+    fn grids_are_shared_and_changed_apart() {
+        let mut particles = Particles { positions: vec![[0.0; 3]; 600], ..Particles::default() };
+        particles.radius = motes_particles::Radius::Uniform(1.0);
+        let (particles, shared) = (Arc::new(particles), Arc::<SharedGrids>::default());
+        let mut stages = [(); 2].map(|()| (Stages::beside(shared.clone()), particles.clone()));
+        let [first, second] = &mut stages;
+        let [a, b] = [load(first, &[]), load(second, &[])];
+        assert!(Arc::ptr_eq(&a.classes, &b.classes));
+        let crowded = |l: &Loaded| l.classes.grids[0].crowded.len();
+        let clear = load(first, &["system.opacity=0.5"]);
+        assert_eq!((crowded(&clear), crowded(&load(second, &[]))), (0, 1));
+        let other = load(second, &["system.radius_scale=2"]);
+        assert!(!Arc::ptr_eq(&a.classes, &other.classes));
+        // Back to what is still there, or was there.
+        assert!(Arc::ptr_eq(&a.classes, &load(first, &[]).classes));
+        drop((a, b, clear, other, stages));
+        let again = load(&mut (Stages::beside(shared), particles), &[]);
+        assert_eq!(crowded(&again), 1);
     }
 
     #[test]

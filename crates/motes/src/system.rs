@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use motes_grid::{BlockRanges, Clip, Filter, Grid, RadiusClasses, Seen, Visibility};
+use motes_grid::{BlockValues, Clip, Filter, Grid, RadiusClasses, Seen, Visibility};
 use motes_particles::expression::{Property, Selection, select};
 use motes_particles::read::names;
 use motes_particles::{Particles, SimulationBox};
-use motes_scene::{Bounds, CapColor, ColorBy, Renderer, Scene, System};
+use motes_scene::{Bounds, CapColor, ColorBy, Component, Renderer, Scene, System};
 use motes_spheres::Spheres;
+use rayon::prelude::*;
 
 use crate::caps::Caps;
 use crate::cut::{Keep, Visible};
@@ -98,15 +99,14 @@ impl Loaded {
 
 /// Boxes around what is `visible`, with radii, in world coordinates.
 pub(crate) fn boxes(classes: &RadiusClasses, visible: &[Visibility], origin: DVec3) -> Vec<Bounds> {
-    let mut boxes = Vec::new();
-    for (grid, visible) in classes.grids.iter().zip(visible) {
-        let blocks = 0..grid.blocks.len() - 1;
+    let in_world =
+        |(low, high): (Vec3, Vec3)| Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin);
+    let of_grid = |(grid, visible): (&Grid, &Visibility)| {
+        let blocks = (0..grid.blocks.len() - 1).into_par_iter().with_min_len(256);
         let seen = blocks.filter_map(|block| block_bounds(grid, visible, block));
-        boxes.extend(
-            seen.map(|(low, high)| Bounds::new(low.as_dvec3() + origin, high.as_dvec3() + origin)),
-        );
-    }
-    boxes
+        seen.map(in_world).collect::<Vec<_>>()
+    };
+    classes.grids.iter().zip(visible).flat_map(of_grid).collect()
 }
 
 /// Whether the system at place `number` is seen as a liquid: the first one that is visible, if anything is.
@@ -129,9 +129,69 @@ pub(crate) fn mark(classes: &RadiusClasses, visible: &[Visibility], seen: &mut [
     }
 }
 
+/// The properties that a system's filters ask for, in the order of its grids. They are kept while these
+/// stand, so that a range can be dragged.
+#[derive(Default)]
+pub(crate) struct Filtered {
+    /// By property and component, grid by grid.
+    values: Vec<(FilterKey, Vec<BlockValues>)>,
+}
+
+type FilterKey = (String, Component);
+
+impl Filtered {
+    /// Those of a system.
+    ///
+    /// # Errors
+    /// There is no such property.
+    pub fn of(particles: &Particles, classes: &RadiusClasses, system: &System) -> Result<Self> {
+        let mut filtered = Self::default();
+        filtered.update(particles, classes, system)?;
+        Ok(filtered)
+    }
+
+    /// Makes those that are missing, and lets go of those that no filter of `system` asks for.
+    ///
+    /// # Errors
+    /// There is no such property.
+    pub fn update(
+        &mut self,
+        particles: &Particles,
+        classes: &RadiusClasses,
+        system: &System,
+    ) -> Result<()> {
+        let keys = || system.filter.iter().map(|f| (f.property.clone(), f.component));
+        self.values.retain(|(had, _)| keys().any(|key| key == *had));
+        for key in keys() {
+            if self.values.iter().all(|(had, _)| *had != key) {
+                let property = find_property(particles, &key.0, key.1)?;
+                let value = |i: u32| property.value(particles, i as usize) as f32;
+                let grids = classes.grids.iter();
+                self.values.push((key, grids.map(|g| BlockValues::of(g, value)).collect()));
+            }
+        }
+        Ok(())
+    }
+
+    /// The filters of `system` for the grid at a place.
+    fn of_grid(&self, system: &System, grid: usize) -> Vec<Filter<'_>> {
+        let filter = |filter: &motes_scene::Filter| {
+            let mut all = self.values.iter();
+            let (_, values) =
+                all.find(|((name, c), _)| *name == filter.property && *c == filter.component)?;
+            Some(Filter {
+                values: &values[grid],
+                min: filter.min.map_or(f32::NEG_INFINITY, |v| v as f32),
+                max: filter.max.map_or(f32::INFINITY, |v| v as f32),
+            })
+        };
+        system.filter.iter().filter_map(filter).collect()
+    }
+}
+
 /// What the filters and the expression of a system let through, of the particles that are `kept` if that is said.
 pub(crate) fn visibility(
-    particles: &Particles,
+    (particles, filtered): (&Particles, &Filtered),
     classes: &RadiusClasses,
     system: &System,
     kept: Option<Keep<'_>>,
@@ -140,38 +200,13 @@ pub(crate) fn visibility(
         "" => None,
         text => Some(select(text, particles).map_err(|e| Error::Usage(e.to_string()))?),
     };
-    let properties = system
-        .filter
-        .iter()
-        .map(|f| find_property(particles, &f.property, f.component))
-        .collect::<Result<Vec<_>>>()?;
-    let values: Vec<Box<dyn Fn(u32) -> f32 + Sync + '_>> = properties
-        .iter()
-        .map(|p| {
-            Box::new(|i: u32| p.value(particles, i as usize) as f32)
-                as Box<dyn Fn(u32) -> f32 + Sync>
-        })
-        .collect();
     let contains = |i: u32| {
         selection.as_ref().is_none_or(|s| s.contains(i)) && kept.is_none_or(|kept| kept(i))
     };
     let keep = (selection.is_some() || kept.is_some()).then_some(&contains as Keep<'_>);
-    let of_grid = |grid: &Grid| {
-        let ranges: Vec<BlockRanges> = values.iter().map(|v| BlockRanges::of(grid, v)).collect();
-        let filters: Vec<Filter<'_>> = system
-            .filter
-            .iter()
-            .zip(values.iter().zip(&ranges))
-            .map(|(filter, (value, ranges))| Filter {
-                value,
-                ranges,
-                min: filter.min.map_or(f32::NEG_INFINITY, |v| v as f32),
-                max: filter.max.map_or(f32::INFINITY, |v| v as f32),
-            })
-            .collect();
-        Visibility::where_all(grid, &filters, keep)
-    };
-    Ok(classes.grids.iter().map(of_grid).collect())
+    let of_grid =
+        |(i, grid): (usize, &Grid)| Visibility::where_all(grid, &filtered.of_grid(system, i), keep);
+    Ok(classes.grids.iter().enumerate().map(of_grid).collect())
 }
 
 /// Whether colours or what is visible go by the particles' ages.

@@ -92,6 +92,20 @@ fn sections_keep_to_their_types_and_systems_and_groups() {
 }
 
 #[test]
+fn a_section_whose_types_nobody_has_is_told_of() {
+    let source = crystal("unknown");
+    let warnings = |more: &str| {
+        let mut session = Session::open(scene(&source, &format!("{CENTRE}{more}")), None).unwrap();
+        session.render(0, Layers::No, &Quiet).unwrap();
+        session.render(0, Layers::No, &Quiet).unwrap();
+        session.warnings()
+    };
+    let expected = "section.0.types: no particle is of type 'K'";
+    assert_eq!(warnings("types = [\"Na\", \"K\"]"), [expected]);
+    assert!(warnings("types = [\"Na\"]").is_empty());
+}
+
+#[test]
 fn a_cut_that_is_off_changes_nothing() {
     let source = crystal("off");
     let off = CENTRE.replace("cut =", "on = false\ncut =");

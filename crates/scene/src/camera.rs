@@ -114,8 +114,17 @@ pub struct Framing<'a> {
     /// Boxes around all that is to be seen; the more there are, the closer the fit. None: a unit box
     /// about the world's origin.
     pub boxes: &'a [Bounds],
+    /// The box around all of them.
+    pub whole: Option<Bounds>,
     /// Part of the picture's width that is kept free at the right, for a legend.
     pub free_right: f64,
+}
+
+impl<'a> Framing<'a> {
+    /// Frames `boxes`, and keeps a part of the width free.
+    pub fn new(boxes: &'a [Bounds], free_right: f64) -> Self {
+        Self { boxes, whole: boxes.iter().copied().reduce(Bounds::union), free_right }
+    }
 }
 
 impl CameraView {
@@ -125,7 +134,7 @@ impl CameraView {
     /// `camera` is taken to be checked, see [`crate::Scene::resolve`]. An `up` along the looking
     /// direction is replaced by an axis that is not.
     pub fn new(camera: &Camera, framing: Framing<'_>, size: (u32, u32)) -> Self {
-        let whole = framing.boxes.iter().copied().reduce(Bounds::union);
+        let whole = framing.whole;
         let bounds = framed(whole);
         let forward = match (camera.position, camera.target, camera.direction) {
             (Some(p), Some(t), _) => t - p,

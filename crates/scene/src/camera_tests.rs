@@ -2,7 +2,7 @@ use super::*;
 
 /// The view that frames one box, or nothing.
 fn look(camera: &Camera, bounds: Option<Bounds>, size: (u32, u32)) -> CameraView {
-    CameraView::new(camera, Framing { boxes: bounds.as_slice(), free_right: 0.0 }, size)
+    CameraView::new(camera, Framing::new(bounds.as_slice(), 0.0), size)
 }
 
 use crate::scene::Scene;
@@ -200,7 +200,7 @@ fn many_boxes_fit_closer_and_a_legend_has_its_room() {
     for projection in ["perspective", "orthographic"] {
         let camera = camera(&[("projection", projection)]);
         for free_right in [0.0, 0.2] {
-            let view = CameraView::new(&camera, Framing { boxes: &boxes, free_right }, SIZE);
+            let view = CameraView::new(&camera, Framing::new(&boxes, free_right), SIZE);
             let corners = boxes.iter().flat_map(Bounds::corners);
             let seen: Vec<_> = corners.map(|c| view.project(c).unwrap()).collect();
             let most = |f: fn(&Projected) -> f64| seen.iter().map(f).fold(f64::MIN, f64::max);
@@ -219,7 +219,7 @@ fn many_boxes_fit_closer_and_a_legend_has_its_room() {
         }
     }
     assert_ne!(
-        CameraView::new(&Camera::default(), Framing { boxes: &boxes, free_right: 0.0 }, SIZE),
+        CameraView::new(&Camera::default(), Framing::new(&boxes, 0.0), SIZE),
         look(&Camera::default(), boxes.iter().copied().reduce(Bounds::union), SIZE)
     );
 }

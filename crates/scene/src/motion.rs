@@ -13,7 +13,6 @@ use std::ops::{Add, Mul, Sub};
 
 use glam::{DQuat, DVec3};
 
-use crate::bounds::Bounds;
 use crate::camera::{CameraView, Framing};
 use crate::error::Result;
 use crate::scene::{Camera, Keyframe, Projection, Scene};
@@ -108,7 +107,7 @@ impl Scene {
 
     /// Moves a view that was free to choose to where all is shown all the way round.
     fn stand_back(&self, view: &mut CameraView, framing: Framing<'_>) {
-        let whole = framing.boxes.iter().copied().reduce(Bounds::union);
+        let whole = framing.whole;
         if self.camera.position.is_some() {
             return;
         }
@@ -179,6 +178,7 @@ fn within(keys: &[Keyframe], time: f64, value: impl Fn(&Keyframe) -> Option<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::Bounds;
 
     fn camera(keys: &str) -> Camera {
         let mut scene = Scene::default();
@@ -269,8 +269,7 @@ mod tests {
             let mut scene = Scene::default();
             scene.set("camera.projection", projection).unwrap();
             scene.set("camera.turn", "360").unwrap();
-            let framing = Framing { boxes: &[bounds], free_right: 0.0 };
-            scene.hold(framing).unwrap();
+            scene.hold(Framing::new(&[bounds], 0.0)).unwrap();
             let held = scene.clone();
             for picture in 0..24 {
                 scene.camera = held.camera.at(Moment { picture, pictures: 24 });
@@ -290,7 +289,7 @@ mod tests {
         let bounds = Bounds::new(DVec3::ZERO, DVec3::new(3.0, 2.0, 1.0));
         let mut scene = Scene::default();
         let framed = scene.resolve(Some(bounds)).unwrap();
-        scene.hold(Framing { boxes: &[bounds], free_right: 0.0 }).unwrap();
+        scene.hold(Framing::new(&[bounds], 0.0)).unwrap();
         let held = scene.resolve(None).unwrap();
         assert!(held.view.eye.abs_diff_eq(framed.view.eye, 1e-12));
         assert!(held.view.up.abs_diff_eq(framed.view.up, 1e-12));

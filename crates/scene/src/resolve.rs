@@ -23,8 +23,8 @@ pub struct Resolved {
     pub lights: Lights,
     /// The background, in linear light.
     pub background: Background,
-    /// Distances from the eye between which what is framed lies, world units.
-    pub range: [f64; 2],
+    /// Distances from the eye between which what is framed lies, world units, if a cue asks for them.
+    pub range: Option<[f64; 2]>,
 }
 
 /// The background in linear light; both alike where it is one colour.
@@ -43,7 +43,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::check`].
     pub fn resolve(&self, bounds: Option<Bounds>) -> Result<Resolved> {
-        self.resolve_framing(Framing { boxes: bounds.as_slice(), free_right: 0.0 })
+        self.resolve_framing(Framing::new(bounds.as_slice(), 0.0))
     }
 
     /// As [`Scene::resolve`], framing boxes around parts of what is visible (with radii).
@@ -52,9 +52,8 @@ impl Scene {
     /// As [`Scene::check`].
     pub fn resolve_framing(&self, framing: Framing<'_>) -> Result<Resolved> {
         self.check()?;
-        let bounds = framing.boxes.iter().copied().reduce(Bounds::union);
         let view = CameraView::new(&self.camera, framing, (self.image.width, self.image.height));
-        let diagonal = bounds.map_or(1.0, |b| b.diagonal());
+        let diagonal = framing.whole.map_or(1.0, |b| b.diagonal());
         // Sprites are not lit.
         let light = if self.cue.has("sprite") { &Light::of(Preset::Flat) } else { &self.light };
         let lights = Lights::new(light, &self.camera, &view, diagonal);
@@ -63,10 +62,13 @@ impl Scene {
             top: Vec3::from(self.image.background.linear()),
             bottom: Vec3::from(bottom.linear()),
         };
-        let range = framing.boxes.iter().fold([f64::INFINITY, 0.0], |[near, far], b| {
-            let [a, z] = view.distances(b);
-            [a.min(near), z.max(far)]
-        });
+        let range = || {
+            framing.boxes.iter().fold([f64::INFINITY, 0.0], |[near, far], b| {
+                let [a, z] = view.distances(b);
+                [a.min(near), z.max(far)]
+            })
+        };
+        let range = (self.cue.has("depth") && self.cue.depth_range.is_none()).then(range);
         Ok(Resolved { view, lights, background, range })
     }
 

@@ -237,7 +237,7 @@ settings! {
         occlusion_radius: Option<f64> = None => "1.0",
         /// Directions in which light from other surfaces is looked for (one diffuse bounce), for each sample of a pixel; 0: none.
         bounce_rays: u32 = 0,
-        /// Whether particles still keep light away where sections have cut them: light as before the cut.
+        /// Whether particles still keep light away where sections have cut them: light as before the cut; the caps are lit.
         uncut: bool = false,
         /// Light from everywhere alike, which no shape shows.
         ambient: f64 = 0.0,

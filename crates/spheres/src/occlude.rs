@@ -209,7 +209,7 @@ impl Occluder {
         }
     }
 
-    /// Sorts the hits by place. Gives the size of a pixel at the least distance.
+    /// Sorts the hits from which light is kept away by place. Gives the size of a pixel at the least distance.
     fn sort(&mut self, work: Work<'_>) -> f32 {
         let Work { rays, hits, view, .. } = work;
         self.order.clear();
@@ -219,6 +219,13 @@ impl Occluder {
             while left != 0 {
                 let ray = block * LANES + left.trailing_zeros() as usize;
                 left &= left - 1;
+                // Before the cut, what it lays open was in the dark: nothing is kept from it.
+                if hits.capped && hits.cap[ray] > 0 && !view.casters.is_empty() {
+                    for sums in [&mut self.key, &mut self.fill] {
+                        (sums.visible[ray], sums.all[ray]) = (1.0, 1.0);
+                    }
+                    continue;
+                }
                 low = low.min(hits.position_of(ray));
                 depth = depth.min(rays.distance[ray]);
                 self.order.push((0, ray as u32));

@@ -343,3 +343,25 @@ fn what_keeps_light_away_may_be_more_than_what_is_seen() {
     };
     assert!(light(&uncut) < 0.7 * light(&[]));
 }
+
+#[test]
+fn what_a_cut_lays_open_is_lit_where_light_is_as_before_the_cut() {
+    let positions = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    let classes = RadiusClasses::build(&positions[..], Radii::Uniform(0.4), Params::default());
+    let all: Vec<Visibility> = classes.grids.iter().map(Visibility::all).collect();
+    // The lower sphere is halved, the upper one is gone.
+    let clip = clip(&[&[face([0.0, 0.0, 0.0], [0.0, 0.0, -1.0], Cut::Caps)]]);
+    let mut sections = Sections::new(&classes.grids, all.clone(), Width::One);
+    sections.set(&classes.grids, clip.clone());
+    let mut lights = lights();
+    (lights.key.direction, lights.key.shadow_rays, lights.occlusion_rays) = (Vec3::Z, 4, 4);
+    let rays = rays(Projection::Orthographic, Vec3::new(0.0, 0.0, 3.0));
+    let systems = [Spheres { clip: Some(&clip), ..Spheres::new(&classes, sections.visible()) }];
+    let uncut = [Spheres::new(&classes, &all)];
+    let light = |casters| {
+        let view = View { rays: &rays, systems: &systems, paint: &White, lights: &lights, casters };
+        let picture = render(view, settings(Primary::Project), &|_, _| true).unwrap();
+        picture.color[(32 * SIZE.0 + 32) as usize][0]
+    };
+    assert!((light(&uncut) - light(&[])).abs() < 1e-3 && light(&[]) > 0.5);
+}

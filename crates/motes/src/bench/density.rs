@@ -93,7 +93,7 @@ impl Set {
     }
 
     fn framing(&self) -> Framing<'_> {
-        Framing { boxes: std::slice::from_ref(&self.bounds), free_right: 0.0 }
+        Framing::new(std::slice::from_ref(&self.bounds), 0.0)
     }
 }
 

@@ -8,11 +8,12 @@
 //! - [`spheres_source`]: one source, frames of a turning camera (`source`)
 //! - [`surface_tables`], [`surface_source`]: the same for liquids (`surface`)
 //! - [`density_tables`], [`density_source`]: Yasuda et al. 2009 (`density`)
-//! - [`sections_tables`], [`sections_source`]: Chaudhari's cuts (`sections`)
+//! - [`sections_tables`], [`sections_source`]: Chaudhari's cuts and cues (`sections`, `cues`)
 //! - `liquid`: the simulation by itself
 //! - `draw`: one loop over packets for every way of finding what a ray hits first
 //! - `standard_grid`, `single_ray`: what the paper compares with; they live here only
 
+mod cues;
 mod density;
 mod draw;
 mod liquid;

@@ -15,17 +15,18 @@ use motes_grid::{
 use motes_scene::{Bounds, Framing, Resolved, Scene};
 use motes_spheres::Spheres;
 
+use super::cues::{self, cued};
 use super::shot::{Shot, Studio, White};
 use super::source::{Line, Source, poses, read};
 use super::table::{Cell, Table};
 use super::{Tables, chosen, median, pool, timed};
 use crate::drawing::instruction_set;
-use crate::system::visibility;
+use crate::system::{Filtered, visibility};
 use crate::{Error, Result, Watch, radius};
 
 /// The stages: frames with up to 8 planes; adding, moving, undoing one of them; the same by the width of a
-/// block's counter (§3.3).
-pub const STAGES: [&str; 3] = ["frame", "change", "width"];
+/// block's counter (§3.3); whole frames with cues (§4, Fig. 8).
+pub const STAGES: [&str; 4] = ["frame", "change", "width", "cues"];
 
 /// Sets like those of the paper: molecules (overlapping spheres), moving particles, and larger ones. Name, demo
 /// set, particles, factor on radii.
@@ -51,8 +52,9 @@ const PICTURES: [(&str, usize, Cut); 9] = [
     ("caps8", 8, Cut::Caps),
 ];
 
-/// Planes of the fullest picture.
+/// Planes of the fullest picture, and of those with cues.
 const PLANES: usize = 8;
+const CUED_PLANES: usize = 4;
 /// Where the planes but the first stand, and how far one moves, in half diagonals.
 const ASIDE: f64 = 0.45;
 const MOVE: f64 = 0.01;
@@ -68,7 +70,7 @@ pub fn sections_source(options: Source, watch: &dyn Watch) -> Result<Line> {
         let mut line = body.line(options.scene.system[0].source.clone());
         for stage in stages {
             watch.progress(stage, 0, 1);
-            let found = body.measure(stage);
+            let found = body.measure(stage)?;
             line.hashes.extend(found.hashes);
             line.ms.extend(found.ms);
             line.bytes.extend(found.bytes);
@@ -95,7 +97,7 @@ pub fn sections_tables(options: &Tables, watch: &dyn Watch) -> Result<Vec<Table>
             (scene.image.width, scene.image.height) = options.size;
             let body = Body::open(&scene, options.frames, watch)?;
             for table in &mut tables {
-                let found = body.measure(table.stage);
+                let found = body.measure(table.stage)?;
                 let cells = table.columns.iter().map(|column| found.cell(column)).collect();
                 table.push((name, body.classes.len()), cells, found.hashes.into_values());
             }
@@ -109,6 +111,7 @@ fn table(stage: &'static str) -> Table {
     let (title, columns) = match stage {
         "frame" => ("Frames with planes", [&frames[..], &["cropped", "live8"]].concat()),
         "change" => ("A plane more, elsewhere, less", vec!["add", "move", "undo"]),
+        "cues" => ("Whole frames with four planes and cues", cues::PICTURES.map(|p| p.0).to_vec()),
         _ => (
             "Bits of a block's counter",
             vec!["undo1", "undo4", "undo8", "counters1", "counters4", "counters8"],
@@ -119,10 +122,10 @@ fn table(stage: &'static str) -> Table {
 
 /// What a stage gave.
 #[derive(Default)]
-struct Found {
-    ms: BTreeMap<&'static str, f64>,
-    bytes: BTreeMap<&'static str, u64>,
-    hashes: BTreeMap<&'static str, String>,
+pub(super) struct Found {
+    pub ms: BTreeMap<&'static str, f64>,
+    pub bytes: BTreeMap<&'static str, u64>,
+    pub hashes: BTreeMap<&'static str, String>,
 }
 
 impl Found {
@@ -138,6 +141,7 @@ impl Found {
 
 /// A set, what is visible of it, and how it is seen.
 struct Body {
+    scene: Scene,
     classes: RadiusClasses,
     base: Vec<Visibility>,
     origin: DVec3,
@@ -161,7 +165,8 @@ impl Body {
         let scale = system.radius_scale as f32;
         let spare = RadiusClasses::default();
         let classes = radius::classes(spare, positions, rule, scale, params);
-        let base = visibility(&particles, &classes, system, None)?;
+        let filtered = Filtered::of(&particles, &classes, system)?;
+        let base = visibility((&particles, &filtered), &classes, system, None)?;
         let origin = DVec3::from_array(particles.origin);
         let around = |grid: &motes_grid::Grid| {
             let (low, high) = (grid.low - grid.greatest_radius, grid.high + grid.greatest_radius);
@@ -169,11 +174,21 @@ impl Body {
         };
         let bounds = classes.grids.iter().map(around).reduce(Bounds::union);
         let bounds = bounds.ok_or_else(|| Error::Usage("there is nothing to cut".into()))?;
-        let framing = Framing { boxes: &[bounds], free_right: 0.0 };
-        let poses = poses(scene, framing, frames)?;
+        let poses = poses(scene, Framing::new(&[bounds], 0.0), frames)?;
         let studio = Studio::new((scene.image.width, scene.image.height));
         let packet = scene.spheres.packet;
-        Ok(Self { classes, base, origin, bounds, poses, frames: frames.max(1), studio, packet })
+        let scene = scene.clone();
+        Ok(Self {
+            scene,
+            classes,
+            base,
+            origin,
+            bounds,
+            poses,
+            frames: frames.max(1),
+            studio,
+            packet,
+        })
     }
 
     fn line(&self, source: String) -> Line {
@@ -192,12 +207,17 @@ impl Body {
         }
     }
 
-    fn measure(&self, stage: &str) -> Found {
-        match stage {
+    fn measure(&self, stage: &str) -> Result<Found> {
+        Ok(match stage {
             "frame" => self.pictures(),
             "change" => self.changes(),
+            "cues" => {
+                let clip = self.clip(CUED_PLANES, Cut::Caps, 0.0);
+                let planes: Vec<Plane> = clip.faces().map(|face| face.plane).collect();
+                cued(&self.scene, (&planes, self.origin), &self.poses)?
+            }
             _ => self.widths(),
-        }
+        })
     }
 
     /// The first `count` planes, the first of them moved by `shift` half diagonals.

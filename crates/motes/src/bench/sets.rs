@@ -1,7 +1,7 @@
 //! The sets of Gribble et al. 2007, Table 1: stand-ins of about their size and structure.
 
 use glam::DVec3;
-use motes_grid::{BlockRanges, Filter, Params, Radii, RadiusClasses, Resolution, Visibility};
+use motes_grid::{BlockValues, Filter, Params, Radii, RadiusClasses, Resolution, Visibility};
 use motes_particles::read::Wanted;
 use motes_particles::{Radius, Series};
 use motes_scene::{Bounds, Rays, Scene};
@@ -106,13 +106,13 @@ impl Loaded {
     pub fn within(&self, built: &Built, (min, max): (f32, f32)) -> (f64, Vec<Visibility>) {
         let value = |i: u32| self.values[i as usize];
         let grids = &built.classes.grids;
-        let ranges: Vec<_> = grids.iter().map(|grid| BlockRanges::of(grid, value)).collect();
+        let values: Vec<_> = grids.iter().map(|grid| BlockValues::of(grid, value)).collect();
         timed(|| {
-            let of = |(grid, ranges)| {
-                let filter = Filter { value: &value, ranges, min, max };
+            let of = |(grid, values)| {
+                let filter = Filter { values, min, max };
                 Visibility::where_all(grid, &[filter], None)
             };
-            grids.iter().zip(&ranges).map(of).collect()
+            grids.iter().zip(&values).map(of).collect()
         })
     }
 

@@ -16,7 +16,7 @@ use crate::cut::Visible;
 use crate::drawing::instruction_set;
 use crate::radius::{self, Spacing};
 use crate::reading::wanted;
-use crate::system::{Loaded, visibility};
+use crate::system::{Filtered, Loaded, visibility};
 use crate::{Error, Result, Watch, peak_memory_bytes};
 
 /// The stages: construction, warm; cold construction and the first frame; frames of a turning camera with
@@ -174,7 +174,7 @@ impl Bench {
         // The first of this process: nothing is warm yet.
         let (first_build, mut loaded) = self.build(RadiusClasses::default())?;
         let boxes = loaded.boxes(self.origin());
-        let framing = Framing { boxes: &boxes, free_right: 0.0 };
+        let framing = Framing::new(&boxes, 0.0);
         let poses = poses(&self.scene, framing, self.frames)?;
         let (first_frame, counts) = timed(|| self.draw(&loaded, &poses[0], (0, 0)));
         self.line.hash = self.studio.hash();
@@ -218,7 +218,8 @@ impl Bench {
                 let positions = particles.positions[..].into();
                 radius::classes(spare, positions, rule, scale, params)
             };
-            let visible = visibility(particles, &classes, system, None)?;
+            let filtered = Filtered::of(particles, &classes, system)?;
+            let visible = visibility((particles, &filtered), &classes, system, None)?;
             Ok::<_, Error>((classes, visible))
         });
         let (classes, visible) = built?;

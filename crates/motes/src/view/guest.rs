@@ -59,6 +59,8 @@ struct Studio {
     exact_took: Duration,
     /// When the state that is drawn was first drawn.
     since: Instant,
+    /// What was odd and has been told.
+    warned: Vec<String>,
 }
 
 /// How well a picture is drawn.
@@ -101,6 +103,7 @@ impl Guest {
             drawn: None,
             exact_took: Duration::MAX,
             since: Instant::now(),
+            warned: Vec::new(),
         };
         Ok(Self {
             newest: AtomicU32::new(state.number),
@@ -411,6 +414,9 @@ impl View for Guest {
                 studio.learn(&scene, (grade, &made), link);
                 let playing = moving == Moving::Plays;
                 let picture = self.told((made, grade, playing), (&scene, number), tell);
+                if grade == Grade::Exact {
+                    studio.warn(tell);
+                }
                 Step { picture: Some(picture), next: then(next) }
             }
             Err(Error::Cancelled) => Step { picture: None, next: Next::Now },
@@ -456,6 +462,16 @@ impl Studio {
     fn pace(&mut self, scene: &Scene) -> &mut Pace {
         let at = self.paces.iter().position(|(renderer, _)| *renderer == scene.renderer);
         &mut self.paces[at.unwrap_or(0)].1
+    }
+
+    /// Tells of what was odd and has not been told.
+    fn warn(&mut self, tell: &(dyn Fn(Value) + Sync)) {
+        for text in self.session.warnings() {
+            if !self.warned.contains(&text) {
+                tell(json!({"is": "notice", "severity": "warning", "text": text}));
+                self.warned.push(text);
+            }
+        }
     }
 
     /// Learns from a picture how the next ones are to be.

@@ -27,6 +27,7 @@ use std::time::Duration;
 use motes_viewer::{Exhibit, View};
 
 use crate::{Quiet, Result, Scene, Session};
+pub(crate) use coarse::simple;
 use guest::{Guest, lock};
 
 /// A scene and its open sources, for any number of clients.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motes_particles::read::names;
-use motes_scene::{Bounds, Projection, Scene};
+use motes_scene::{Projection, Scene};
 use serde_json::{Value, json};
 
 use crate::info::properties;
@@ -79,7 +79,7 @@ pub(super) fn resolved(scene: &Scene, seen: &Seen, (frames, playing): (usize, bo
     let resolved = scene.resolve_framing(seen.framing(scene));
     let resolved = resolved.as_ref().unwrap_or(&seen.resolved);
     let view = &resolved.view;
-    let whole = seen.boxes.iter().copied().reduce(Bounds::union);
+    let whole = seen.boxes.whole;
     let projection = match view.projection {
         Projection::Perspective => "perspective",
         Projection::Orthographic => "orthographic",

@@ -60,6 +60,15 @@ export async function serve(sources, ...args) {
       return code;
     },
     running: () => child.exitCode === null,
+    /** Bytes of memory that it holds; 0 where the system does not say. */
+    memory() {
+      try {
+        const kilobytes = /VmRSS:\s+(\d+)/.exec(fs.readFileSync(`/proc/${child.pid}/status`, 'utf8'));
+        return 1024 * Number(kilobytes?.[1] ?? 0);
+      } catch {
+        return 0;
+      }
+    },
   };
 }
 

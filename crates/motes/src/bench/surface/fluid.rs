@@ -74,7 +74,7 @@ impl Fluid {
 
     /// What the default camera frames: the box around the spheres.
     pub fn framing(&self) -> Framing<'_> {
-        Framing { boxes: std::slice::from_ref(&self.bounds), free_right: 0.0 }
+        Framing::new(std::slice::from_ref(&self.bounds), 0.0)
     }
 
     /// The particles as a liquid.
