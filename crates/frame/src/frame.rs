@@ -118,6 +118,11 @@ impl Frame {
         Ok(self)
     }
 
+    /// The colours, and the layers that no copy shares.
+    pub fn into_parts(self) -> (Vec<[f32; 4]>, Vec<Layer>) {
+        (self.color, Arc::try_unwrap(self.layers).unwrap_or_default())
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width

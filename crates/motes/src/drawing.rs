@@ -1,12 +1,12 @@
 //! The picture of what was loaded, by the scene's way of seeing.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_frame::{Frame, Layer};
 use motes_scene::{Bounds, Renderer, Resolved, Scene};
-use motes_spheres::{Adaptive, Center, Finer, Primary, Settings, View};
+use motes_spheres::{Adaptive, Finer, Picture, Primary, Settings, View};
 use motes_surface::MOST_MEDIA;
 use rayon::prelude::*;
 
@@ -38,6 +38,8 @@ pub(crate) struct Drawing<'a> {
 pub(crate) struct Kept {
     /// The renderer of spheres, with its memory.
     renderer: motes_spheres::Renderer,
+    /// Memory for its next picture.
+    spare: Mutex<Picture>,
     boundaries: Boundaries,
     fields: Fields,
     media: Memo<Same<Visible>, Vec<(usize, Arc<Visible>)>>,
@@ -47,6 +49,7 @@ impl Default for Kept {
     fn default() -> Self {
         Self {
             renderer: motes_spheres::Renderer::new(),
+            spare: Mutex::default(),
             // Several liquids, and all of them as one.
             boundaries: Memo::new(MOST_MEDIA + 1),
             fields: Fields::default(),
@@ -159,23 +162,58 @@ impl Drawing<'_> {
             level,
         };
         let tell = |done, total| watch.progress("render", done, total);
-        let traced = self.kept.renderer.picture(view, settings, &tell).ok_or(Error::Cancelled)?;
-        stats.counts.insert("tests", traced.counts.tests);
-        stats.counts.insert("spheres", traced.counts.spheres);
-        let frame = Frame::new(image.width as usize, image.height as usize, traced.color)?;
-        if layers { with_layers(frame, &traced.center, &entries) } else { Ok(frame) }
+        let mut picture = std::mem::take(&mut *self.kept.spare());
+        let drawn = self.kept.renderer.picture(view, settings, &mut picture, &tell);
+        if !drawn {
+            *self.kept.spare() = picture;
+            return Err(Error::Cancelled);
+        }
+        stats.counts.insert("tests", picture.counts.tests);
+        stats.counts.insert("spheres", picture.counts.spheres);
+        let Picture { color, layers: seen, .. } = picture;
+        let frame = Frame::new(image.width as usize, image.height as usize, color)?;
+        if layers { with_layers(frame, seen, &entries) } else { Ok(frame) }
     }
 }
 
-fn with_layers(frame: Frame, center: &[Center], entries: &Entries<'_>) -> Result<Frame> {
+impl Kept {
+    fn spare(&self) -> MutexGuard<'_, Picture> {
+        // Whatever it holds is drawn over.
+        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes the memory of a frame that nobody looks at any more, for the next one.
+    pub fn recycle(&self, frame: Frame) {
+        let (color, layers) = frame.into_parts();
+        let mut picture = Picture { color, ..Picture::default() };
+        for layer in layers {
+            match layer {
+                Layer::Depth(depth) => picture.layers.depth = depth,
+                Layer::Normal(normal) => picture.layers.normal = normal,
+                Layer::Id(id) => picture.layers.id = id,
+                Layer::System(system) => picture.layers.system = system,
+                Layer::SpanCount(_) | Layer::Thickness(_) => {}
+            }
+        }
+        *self.spare() = picture;
+    }
+}
+
+fn with_layers(
+    frame: Frame,
+    mut seen: motes_spheres::Layers,
+    entries: &Entries<'_>,
+) -> Result<Frame> {
     // Where nothing is, the system is 0.
-    let system = |c: &Center| if c.id < 0 { 0 } else { entries.system(c.system).number };
-    let each = || center.par_iter().with_min_len(1 << 14);
+    let number = |(system, id): (&mut u16, &i64)| {
+        *system = if *id < 0 { 0 } else { entries.system(*system).number };
+    };
+    seen.system.par_iter_mut().with_min_len(1 << 14).zip(&seen.id).for_each(number);
     Ok(frame
-        .with(Layer::Depth(each().map(|c| c.depth).collect()))?
-        .with(Layer::Normal(each().map(|c| c.normal).collect()))?
-        .with(Layer::Id(each().map(|c| c.id).collect()))?
-        .with(Layer::System(each().map(system).collect()))?)
+        .with(Layer::Depth(seen.depth))?
+        .with(Layer::Normal(seen.normal))?
+        .with(Layer::Id(seen.id))?
+        .with(Layer::System(seen.system))?)
 }
 
 /// The name of an instruction set.

@@ -271,6 +271,11 @@ impl Session {
         Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, origin } })
     }
 
+    /// Takes the memory of a picture that nobody looks at any more, for the next one.
+    pub(crate) fn recycle(&self, shown: Frame) {
+        self.kept.recycle(shown);
+    }
+
     /// What there is to be seen of the scene's frame, before anything is drawn.
     ///
     /// # Errors

@@ -43,7 +43,7 @@ mod traverse;
 pub use frustum::{Bounds, Frustum};
 pub use intersect::{Sphere, farthest, intersect};
 pub use packet::{LANES, MOST_RAYS, Packet, Surface};
-pub use picture::{Picture, render};
+pub use picture::{Layers, Picture, render};
 pub use refine::Adaptive;
 pub use render::{Cap, Center, Finer, Primary, Renderer, Settings, Sink, Tile, View};
 pub use shade::Paint;

@@ -17,6 +17,7 @@ use crate::occlude::{Occluder, Work};
 use crate::overview::{GroupView, overview};
 use crate::packet::{MOST_RAYS, NO_SLOT, Packet, Surface};
 use crate::peel::Peel;
+use crate::picture::Layers;
 use crate::project::project;
 use crate::refine::{Adaptive, Refine};
 use crate::shade::{Canvas, Paint, shade};
@@ -120,7 +121,7 @@ pub struct Tile<'a> {
     /// Linear, premultiplied RGBA, row by row.
     pub color: &'a [[f32; 4]],
     /// What the rays through the pixels' centres hit; empty if layers were not wanted.
-    pub center: &'a [Center],
+    pub layers: &'a Layers,
 }
 
 /// Takes the parts of a picture as they are finished, in any order and on any thread.
@@ -164,7 +165,7 @@ impl Renderer {
                     let mut area = next.fetch_add(1, Ordering::Relaxed);
                     while area < areas && !stopped.load(Ordering::Relaxed) {
                         dispatch!(settings.level, simd => plan.area(simd, area, &mut desk, &mut counts));
-                        if !sink.tile(&desk.tile(plan.place(area), settings.layers)) {
+                        if !sink.tile(&desk.tile(plan.place(area))) {
                             stopped.store(true, Ordering::Relaxed);
                         }
                         area = next.fetch_add(1, Ordering::Relaxed);
@@ -205,7 +206,7 @@ struct Desk {
     color: Vec<[f32; 4]>,
     /// Whether there is no light in `color`.
     blank: bool,
-    center: Vec<Center>,
+    layers: Layers,
 }
 
 impl Desk {
@@ -220,13 +221,13 @@ impl Desk {
             refine: Refine::new(),
             color: Vec::new(),
             blank: true,
-            center: Vec::new(),
+            layers: Layers::default(),
         }
     }
 
-    fn tile(&self, place: Place, layers: bool) -> Tile<'_> {
-        let center = if layers { &self.center[..] } else { &[] };
-        Tile { corner: place.corner, size: place.size, color: &self.color, center }
+    fn tile(&self, place: Place) -> Tile<'_> {
+        let Self { color, layers, .. } = self;
+        Tile { corner: place.corner, size: place.size, color, layers }
     }
 }
 
@@ -345,10 +346,7 @@ impl<'a> Plan<'a> {
             desk.color.resize(pixels, [0.0; 4]);
             desk.blank = true;
         }
-        desk.center.clear();
-        if self.settings.layers {
-            desk.center.resize(pixels, Center::NOTHING);
-        }
+        desk.layers.clear(if self.settings.layers { pixels } else { 0 });
         let projected = self.settings.primary == Primary::Project;
         // What is out of focus shows where it would not be.
         let projected = projected && self.settings.finer.lens.is_none();
@@ -374,16 +372,20 @@ impl<'a> Plan<'a> {
         }
         if self.settings.layers {
             let middle = Pattern::of(&[[0.5; 2]]);
-            let (pattern, lens) = (middle, None);
-            let round =
-                Round { area, place, part: place, pattern, first_sample: 0, course: 0, lens };
-            self.first_hits(simd, &round, desk, counts);
-            desk.hits.gather(simd, &desk.rays, self.view.systems);
+            if !self.is_plain(&middle) {
+                let (pattern, lens) = (middle, None);
+                let round =
+                    Round { area, place, part: place, pattern, first_sample: 0, course: 0, lens };
+                self.first_hits(simd, &round, desk, counts);
+                desk.hits.gather(simd, &desk.rays, self.view.systems);
+            }
             for y in 0..place.size.1 {
                 for x in 0..place.size.0 {
                     let ray = middle.ray((x, y), 0);
                     let at = (y * place.size.0 + x) as usize;
-                    desk.center[at] = desk.hits.center(&desk.rays, ray);
+                    if desk.hits.has(ray) {
+                        desk.layers.put(at, desk.hits.center(&desk.rays, ray));
+                    }
                 }
             }
         }
@@ -408,6 +410,13 @@ impl<'a> Plan<'a> {
             let how = (&round.pattern, self.weight(round), adaptive.exposure);
             desk.refine.end_part((round.place, round.part), how, &mut desk.color);
         }
+    }
+
+    /// Whether the last rays that were sent are those of pattern `middle` alone, and what they hit is known.
+    fn is_plain(&self, middle: &Pattern) -> bool {
+        let courses = &self.courses[..];
+        let one = matches!(courses, [Course { rounds, .. }] if matches!(&rounds[..], [of] if of == middle));
+        one && self.settings.finer.lens.is_none() && !self.view.paint.translucent()
     }
 
     /// How pixels are judged, if any may get more samples.

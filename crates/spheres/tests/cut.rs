@@ -167,18 +167,18 @@ fn check(name: &str, cuts: &Cuts, rays: &Rays) -> usize {
     let lights = lights();
     let projected = cuts.render(rays, &lights, settings(Primary::Project));
     let traced = cuts.render(rays, &lights, settings(Primary::Trace));
-    for (i, both) in projected.center.iter().zip(&traced.center).enumerate() {
+    for (i, both) in projected.layers.iter().zip(traced.layers.iter()).enumerate() {
         assert_eq!(both.0, both.1, "{name}: pixel {i}");
     }
     assert!(projected.color == traced.color, "{name}: light");
     let (mut caps, mut doubts) = (0, 0);
-    for (i, hit) in projected.center.iter().enumerate() {
+    for (i, hit) in projected.layers.iter().enumerate() {
         let (x, y) = (i as u32 % SIZE.0, i as u32 / SIZE.0);
         let (origin, direction) = rays.ray(x as f32 + 0.5, y as f32 + 0.5);
         let ray = (origin.as_dvec3(), direction.as_dvec3().normalize());
         let slack = 1e-5;
         let truth = cuts.truth(ray, 0.0, 0.0);
-        if agrees(hit, truth, slack) {
+        if agrees(&hit, truth, slack) {
             let faces = cuts.clips.iter().flat_map(Clip::faces);
             let normals: Vec<DVec3> = faces.map(|f| f.plane.normal.as_dvec3()).collect();
             let on_cap = |n: DVec3| normals.iter().any(|face| face.dot(n).abs() > 1.0 - 1e-12);
@@ -189,10 +189,10 @@ fn check(name: &str, cuts: &Cuts, rays: &Rays) -> usize {
         let near = [-slack, 0.0, slack];
         let variants = near.iter().flat_map(|s| near.iter().map(move |g| (*s, *g)));
         let mut variants = variants.map(|(shift, grown)| cuts.truth(ray, shift, grown));
-        let some = variants.any(|truth| agrees(hit, truth, slack));
+        let some = variants.any(|truth| agrees(&hit, truth, slack));
         assert!(some, "{name}: ray {x}, {y}: {hit:?} against {truth:?}");
     }
-    assert!(doubts * 20 < projected.center.len(), "{name}: {doubts} rays are in doubt");
+    assert!(doubts * 20 < projected.color.len(), "{name}: {doubts} rays are in doubt");
     caps
 }
 
@@ -303,7 +303,7 @@ fn everything_taken_away_leaves_nothing() {
         settings(Primary::Project),
     );
     assert_eq!(picture.counts.spheres + picture.counts.tests, 0);
-    assert!(picture.center.iter().all(|c| c.id < 0));
+    assert!(picture.layers.iter().all(|c| c.id < 0));
 }
 
 #[test]
@@ -316,7 +316,7 @@ fn caps_lie_in_full_light_and_have_the_colour_of_the_inside() {
     let rays = rays(Projection::Orthographic, Vec3::new(0.0, 0.0, 3.0));
     let half = clip(&[&[face([0.0, 0.0, 0.05], [0.0, 0.0, -1.0], Cut::Caps)]]);
     let picture = Cuts::new(lattice(), half).render(&rays, &lights, settings(Primary::Project));
-    let caps = picture.center.iter().zip(&picture.color);
+    let caps = picture.layers.iter().zip(&picture.color);
     let caps: Vec<_> = caps.filter(|(c, _)| c.normal == [0.0, 0.0, 1.0]).map(|c| *c.1).collect();
     assert!(caps.len() > 1000, "{}", caps.len());
     assert!(caps.iter().all(|color| *color == caps[0] && color[0] > 0.5 && color[1] == 0.0));

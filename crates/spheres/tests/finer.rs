@@ -100,7 +100,7 @@ fn pixels_with_equal_samples_get_no_more() {
         |samples, finer| picture(&[([0.0; 3], 1.5)], 0.5, (&flat, &rays), settings(samples, finer));
     let (few, more, truth) =
         (of(4, Finer::default()), of(4, adaptive(64, 0.02)), of(256, Finer::default()));
-    assert!(few.center == more.center);
+    assert!(few.layers == more.layers);
     for (few, more) in few.color.iter().zip(&more.color) {
         let differs = few[3] > 0.0 && few[3] < 1.0;
         assert!(differs || few == more, "{few:?} {more:?}");
@@ -170,7 +170,7 @@ fn what_is_in_focus_is_sharp_and_what_is_not_is_blurred() {
     let wide = |seen: &Picture| seen.color.iter().filter(|c| c[3] > 0.0).count() as f32;
     let lens = Some(Lens { radius: 0.5, focus: 10.0 });
     let (sharp, through) = (of(0.0, 0.02, None), of(0.0, 0.02, lens));
-    assert!(sharp.center == through.center);
+    assert!(sharp.layers == through.layers);
     assert!((wide(&through) - wide(&sharp)).abs() <= 4.0);
     assert!((cover(&through) / cover(&sharp) - 1.0).abs() < 0.05);
     // At twice the distance of focus a point spreads, as seen at the focus, over a disc of half the

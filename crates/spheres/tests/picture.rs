@@ -87,7 +87,7 @@ fn spheres_beside_the_eye_are_not_drawn() {
     let lights = lights(|_| {});
     let seen = picture(&beside, &lights, &rays(Projection::Perspective), settings(1));
     assert_eq!(seen.counts.tests, 0);
-    assert!(seen.center.iter().all(|center| center.id < 0));
+    assert!(seen.layers.iter().all(|center| center.id < 0));
 
     // One that the plane cuts, too, but that reaches into the view.
     let mut near = beside;
@@ -95,8 +95,8 @@ fn spheres_beside_the_eye_are_not_drawn() {
     let rays = rays(Projection::Perspective);
     let seen = picture(&near, &lights, &rays, settings(1));
     let traced = Settings { primary: Primary::Trace, ..settings(1) };
-    assert!(seen.center.iter().any(|center| center.id == 64));
-    assert_eq!(seen.center, picture(&near, &lights, &rays, traced).center);
+    assert!(seen.layers.iter().any(|center| center.id == 64));
+    assert_eq!(seen.layers, picture(&near, &lights, &rays, traced).layers);
 }
 
 fn center_of(picture: &Picture) -> [f32; 4] {
@@ -115,7 +115,7 @@ fn packets_threads_and_tiles_do_not_change_a_picture() {
                 let traced = Settings { primary: Primary::Trace, packet, ..small };
                 let other = picture(&spheres, &lights, &rays, traced);
                 assert!(other.color == first.color, "{samples} samples, packets of {packet}");
-                assert!(other.center == first.center);
+                assert!(other.layers == first.layers);
             }
             if samples == 300 {
                 continue;
@@ -221,11 +221,11 @@ fn the_middle_ray_tells_depth_normal_and_particle() {
     let odd = Settings { size: (41, 41), ..settings(4) };
     let rays = Rays { center: [20.5, 20.5], ..rays(Projection::Perspective) };
     let seen = picture(&spheres, &lights(|_| {}), &rays, odd);
-    let middle = seen.center[20 * 41 + 20];
+    let middle = seen.layers.get(20 * 41 + 20);
     assert_eq!((middle.id, middle.system), (1, 0));
     assert!((middle.depth - 7.0).abs() < 1e-5);
     assert!(Vec3::from_array(middle.normal).distance(Vec3::Z) < 1e-4);
-    let corner = seen.center[0];
+    let corner = seen.layers.get(0);
     assert_eq!((corner.id, corner.depth, corner.normal), (-1, f32::INFINITY, [0.0; 3]));
 }
 

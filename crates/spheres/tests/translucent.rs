@@ -179,7 +179,7 @@ fn layers_of_glass_hide_as_much_as_their_product() {
         let [r, _, _, a] = middle(&seen);
         assert!((a - truth).abs() < 1e-6 && (r - 0.5 * truth).abs() < 1e-6, "{n}: {r} {a}");
         // Layers are of the first surface.
-        let center = seen.center[(SIZE.1 / 2 * SIZE.0 + SIZE.0 / 2) as usize];
+        let center = seen.layers.get((SIZE.1 / 2 * SIZE.0 + SIZE.0 / 2) as usize);
         assert_eq!(center.id, n as i64 - 1);
     }
 }
@@ -200,7 +200,7 @@ fn what_is_opaque_is_as_without_glass() {
     let plain = picture((&positions, &radii), &White, &lit, (Primary::Project, 8));
     let glass = Glass { first: 1.0, others: 1.0 };
     let through = picture((&positions, &radii), &glass, &lit, (Primary::Project, 8));
-    assert!(plain.center == through.center);
+    assert!(plain.layers == through.layers);
     // The same rays, added up in another order.
     for (a, b) in plain.color.as_flattened().iter().zip(through.color.as_flattened()) {
         assert!((a - b).abs() < 1e-5, "{a} {b}");

@@ -157,8 +157,8 @@ fn clipped(value: f32, most: f32) -> f32 {
 /// Mean brightness to the eye (sRGB luma, 0 … 1) of the picture's outer eighth, over white paper.
 fn rim_brightness(frame: &Frame) -> f32 {
     let (width, height) = (frame.width(), frame.height());
-    // Some ten thousand pixels tell as much as all.
-    let step = (width.max(height) / 200).max(1);
+    // Some thousand pixels tell as much as all.
+    let step = (width.max(height) / 64).max(1);
     let inner = |i: usize, size: usize| i >= size / 8 && i < size - size / 8;
     let (mut sum, mut count) = (0.0, 0.0);
     for y in (0..height).step_by(step) {

@@ -57,7 +57,7 @@ pub(super) fn cued(
                 found.hashes.insert(name, format!("{:016x}", picture.shown.hash()));
             } else {
                 let (ms, look) = timed(|| session.look(0, false, &Quiet));
-                look?;
+                session.recycle(look?.shown);
                 all.push(ms);
             }
         }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use motes_frame::rgb8;
+use motes_frame::{Frame, rgb8};
 use motes_scene::Renderer;
 use motes_viewer::{Link, Next, Picture, Request, Step, View};
 use serde_json::{Map, Value, json};
@@ -303,20 +303,20 @@ impl Guest {
         })
     }
 
-    /// The picture as it is sent; beside an exact one more is told.
+    /// The picture as it is sent, and as it was drawn; beside an exact one more is told.
     fn told(
         &self,
         ((look, took), grade, playing): ((Look, Duration), Grade, bool),
         (scene, number): (&Scene, u32),
         tell: &(dyn Fn(Value) + Sync),
-    ) -> Picture {
+    ) -> (Picture, Frame) {
         if grade == Grade::Exact {
             self.tell_of(&look, tell);
         } else {
             *lock(&self.seen) = Some(look.seen);
         }
         let side = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
-        Picture {
+        let picture = Picture {
             size: (side(look.shown.width()), side(look.shown.height())),
             rgb: rgb8(&look.shown),
             exact: grade == Grade::Exact,
@@ -326,7 +326,8 @@ impl Guest {
             took,
             state: number,
             hash: look.hash,
-        }
+        };
+        (picture, look.shown)
     }
 
     /// Tells what the page shows beside an exact picture.
@@ -413,7 +414,8 @@ impl View for Guest {
                 studio.drawn = Some((number, grade));
                 studio.learn(&scene, (grade, &made), link);
                 let playing = moving == Moving::Plays;
-                let picture = self.told((made, grade, playing), (&scene, number), tell);
+                let (picture, shown) = self.told((made, grade, playing), (&scene, number), tell);
+                studio.session.recycle(shown);
                 if grade == Grade::Exact {
                     studio.warn(tell);
                 }
