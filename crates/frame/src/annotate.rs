@@ -35,7 +35,12 @@ pub struct Annotations {
     pub caption: Option<String>,
     /// Where the axes point; in a bottom corner.
     pub axes: Option<Axes>,
+    /// How many times the picture will be enlarged: its text then has the size it would have without. 0 and 1: not.
+    pub enlarged: f32,
 }
+
+/// Text is no smaller than so many pixels, as far as the picture has room.
+const LEAST_TEXT: f32 = 12.5;
 
 /// The left or the right of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,7 +60,7 @@ impl Annotations {
         if frame.color().is_empty() {
             return;
         }
-        let mut canvas = Canvas::new(frame, self.ink);
+        let mut canvas = Canvas::new(frame, self.ink, LEAST_TEXT / self.enlarged.max(1.0));
         if let Some(lines) = &self.lines {
             lines.draw(&mut canvas);
         }

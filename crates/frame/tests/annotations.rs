@@ -35,6 +35,7 @@ fn everything(legend: Option<Legend>) -> Annotations {
         scale_bar: Some(ScaleBar { pixels_per_unit: 37.0, unit: "Å".into() }),
         caption: Some("t = 1 ps\nsecond line".into()),
         axes: Some(Axes { directions, side: Side::Left }),
+        enlarged: 1.0,
     }
 }
 

@@ -24,6 +24,8 @@ pub(crate) struct Annotated<'a> {
     pub frame: usize,
     /// Whether it is one of several frames.
     pub film: bool,
+    /// How many times the picture is enlarged when it is shown.
+    pub enlarged: f32,
 }
 
 /// All annotations of a picture.
@@ -44,6 +46,7 @@ pub(crate) fn annotations(
         caption: on(overlay.time, annotated.film || annotated.frame > 0)
             .then(|| caption(annotated.systems, annotated.frame)),
         axes: on(overlay.axes, false).then(|| axes(view)),
+        enlarged: annotated.enlarged,
     }
 }
 

@@ -239,7 +239,8 @@ impl Session {
         let drawn = self.draw((shot, after), layers, watch)?;
         let mut stats = drawn.stats;
         let start = Instant::now();
-        let annotated = Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film };
+        let annotated =
+            Annotated { systems: &drawn.loaded, frame: shot.frame, film: self.film, enlarged: 1.0 };
         let shown = self.finish(drawn.raw.clone(), &drawn.resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         stats.hash = format!("{:016x}", drawn.raw.hash());
@@ -255,17 +256,22 @@ impl Session {
     }
 
     /// A picture as it is shown, and what it is of; of a passing one without its hash, and with lines before
-    /// what a liquid would hide of them.
+    /// what a liquid would hide of them. It is `enlarged` so many times when it is shown.
     ///
     /// # Errors
     /// As [`Session::render`].
-    pub(crate) fn look(&mut self, frame: usize, hashed: bool, watch: &dyn Watch) -> Result<Look> {
+    pub(crate) fn look(
+        &mut self,
+        frame: usize,
+        (hashed, enlarged): (bool, f32),
+        watch: &dyn Watch,
+    ) -> Result<Look> {
         let after = if hashed { After::Kept } else { After::Moves };
         let drawn = self.draw((frame.into(), after), Layers::No, watch)?;
         let Drawn { raw, mut stats, loaded, resolved, boxes, origin, .. } = drawn;
         let hash = if hashed { raw.hash() } else { 0 };
         let start = Instant::now();
-        let annotated = Annotated { systems: &loaded, frame, film: self.film };
+        let annotated = Annotated { systems: &loaded, frame, film: self.film, enlarged };
         let shown = self.finish(raw, &resolved, &annotated)?;
         stats.ms.insert("finish", milliseconds(start));
         Ok(Look { shown, hash, stats, seen: Seen { loaded, resolved, boxes, origin } })

@@ -40,7 +40,8 @@ const LIGHT_HALO: f32 = 0.7;
 const DARK_HALO: f32 = 0.85;
 
 impl<'a> Canvas<'a> {
-    pub(crate) fn new(frame: &'a mut Frame, ink: Ink) -> Canvas<'a> {
+    /// Text is no smaller than `least` pixels, as far as the picture has room.
+    pub(crate) fn new(frame: &'a mut Frame, ink: Ink, least: f32) -> Canvas<'a> {
         let dark = match ink {
             Ink::Auto => rim_brightness(frame) > 0.5,
             Ink::Dark => true,
@@ -51,7 +52,7 @@ impl<'a> Canvas<'a> {
         let (ink, paper) = if dark { (grey(0.09), grey(1.0)) } else { (grey(0.97), grey(0.06)) };
         // 480 rows get 13 pixels, 1080 get 27, 2160 get 54; a tall narrow picture counts as wide as 4:5.
         let side = (frame.height() as f32).min(frame.width() as f32 * 0.8);
-        let em = (0.025 * side).max((0.1 * side).min(12.5));
+        let em = (0.025 * side).max((0.1 * side).min(least));
         Canvas { frame, ink, paper, em }
     }
 

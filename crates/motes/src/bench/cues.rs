@@ -56,7 +56,7 @@ pub(super) fn cued(
                 let picture = session.render(0, Layers::No, &Quiet)?;
                 found.hashes.insert(name, format!("{:016x}", picture.shown.hash()));
             } else {
-                let (ms, look) = timed(|| session.look(0, false, &Quiet));
+                let (ms, look) = timed(|| session.look(0, (false, 1.0), &Quiet));
                 session.recycle(look?.shown);
                 all.push(ms);
             }

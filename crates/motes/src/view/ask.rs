@@ -112,6 +112,13 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
         }
         if let Some(seen) = &seen {
             inquire::check_changes((&scene, state.scene()), seen)?;
+            // What comes and goes with a filter or a cut is not to move the camera.
+            let of_particles =
+                |path: &String| ["system", "section"].iter().any(|p| path.starts_with(p));
+            if changes.keys().any(of_particles) {
+                stand(&mut scene.camera, &seen.resolved.view);
+                state.settle(|camera| stand(camera, &seen.resolved.view));
+            }
         }
         state.change(scene, ends)
     })

@@ -81,7 +81,8 @@ impl Pace {
         Self { step: if renderer == Renderer::Spheres { 0 } else { 4 }, ..Self::default() }
     }
 
-    fn divide(self) -> f64 {
+    /// How many times smaller than the canvas pictures are, along each side.
+    pub fn divide(self) -> f64 {
         STEPS[self.step]
     }
 

@@ -268,15 +268,18 @@ impl Guest {
         (scene, number, grade): (&Scene, u32, Grade),
         tell: &(dyn Fn(Value) + Sync),
     ) -> Result<(Look, Duration)> {
-        let of = match grade {
-            Grade::Coarse => studio.pace(scene).coarse(scene),
-            Grade::Simple => simple(scene),
-            Grade::Exact => scene.clone(),
+        let (of, enlarged) = match grade {
+            Grade::Coarse => (studio.pace(scene).coarse(scene), studio.pace(scene).divide()),
+            Grade::Simple => (simple(scene), 1.0),
+            Grade::Exact => (scene.clone(), 1.0),
         };
         studio.session.set_scene(of)?;
         let watch = Drawing { guest: self, number, grade, since: Instant::now(), tell };
-        let look =
-            studio.session.look(scene.image.frame as usize, grade == Grade::Exact, &watch)?;
+        let look = studio.session.look(
+            scene.image.frame as usize,
+            (grade == Grade::Exact, enlarged as f32),
+            &watch,
+        )?;
         Ok((look, watch.since.elapsed()))
     }
 

@@ -133,6 +133,19 @@ page('the handles of the histogram hold the range of the colours and of what is 
   await seen.screenshot('range');
 });
 
+page('the camera stands while filters and planes come and go', 'demo:dam:20000', {}, async (seen) => {
+  const { position } = await seen.camera();
+  await seen.store("store.set({ 'system.0.filter': [{ property: 'Position', component: 'x', min: 0.5 }] })");
+  await seen.exact();
+  await seen.store("store.set({ section: [{ normal: [0, 0, 1], point: [0.5, 0.5, 0.2] }] })");
+  await seen.exact();
+  assert.deepEqual((await seen.camera()).position, position);
+  await seen.canvas.focus();
+  await seen.page.keyboard.press('f');
+  await seen.exact();
+  assert.notDeepEqual((await seen.camera()).position, position, 'F frames what is left');
+});
+
 page('frames play, stop, and are stepped', PEPTIDE, {}, async (seen) => {
   assert.equal(await seen.store('store.resolved.frames'), 5);
   await seen.canvas.focus();
