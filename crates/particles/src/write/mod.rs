@@ -132,9 +132,7 @@ mod tests {
                     assert_eq!(a, b, "{end}: {} {i}", column.name);
                 }
             }
-            if format != Format::Npz {
-                assert_eq!((after.time, after.step), (Some(0.125), Some(42)), "{end}");
-            }
+            assert_eq!((after.time, after.step), (Some(0.125), Some(42)), "{end}");
             if format == Format::Xyz {
                 assert_eq!(after.sim_box, before.sim_box);
             }

@@ -1,5 +1,5 @@
 //! NPZ: a ZIP archive, not compressed, of one NPY array (NumPy enhancement proposal 1, version 1.0) for
-//! `position`, `radius` and each column, little endian.
+//! `position`, `radius` and each column, little endian; `time` and `step`, one number each, where they are known.
 
 use std::borrow::Cow;
 use std::io::{self, Seek, Write};
@@ -27,6 +27,12 @@ pub(super) fn write(particles: &Particles, out: impl Write + Seek) -> io::Result
     }
     for column in &particles.columns {
         array(&mut archive, (&column.name, column.components, count), &plain(column))?;
+    }
+    if let Some(time) = particles.time {
+        array(&mut archive, ("time", 1, 1), &Values::F64(vec![time]))?;
+    }
+    if let Some(step) = particles.step {
+        array(&mut archive, ("step", 1, 1), &Values::I64(vec![step]))?;
     }
     archive.finish()?.flush()
 }

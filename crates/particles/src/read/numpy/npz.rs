@@ -1,12 +1,13 @@
 //! NPZ: a ZIP archive of NPY arrays, one per name.
 //!
 //! Positions are `x`, `y` and perhaps `z`, or one array called `position`, `pos`, `coordinates` …; or
-//! the only array, as if it were bare. Arrays with as many rows are columns.
+//! the only array, as if it were bare. Arrays with as many rows are columns; `time` and `step`, with a number for
+//! all frames or one for each, are those of the frames.
 
 use std::io::Read;
 use std::sync::Arc;
 
-use super::array::{Array, HEADER_BYTES, MOST_COLUMNS_BESIDE_ROWS, View};
+use super::array::{Array, HEADER_BYTES, Item, MOST_COLUMNS_BESIDE_ROWS, View};
 use super::zip::{self, Member};
 use super::{NamedLane, bare_columns};
 use crate::read::fields::{POSITION_VECTORS, Plan, Slot, Table};
@@ -36,8 +37,13 @@ impl Format for Npz {
     }
 
     fn open(&self, input: Input) -> Result<Box<dyn Reader>> {
-        let mut reader =
-            NpzReader { input: Arc::new(input), arrays: vec![], frames: 1, left_out: vec![] };
+        let mut reader = NpzReader {
+            input: Arc::new(input),
+            arrays: vec![],
+            clock: [None, None],
+            frames: 1,
+            left_out: vec![],
+        };
         reader.find()?;
         Ok(Box::new(reader))
     }
@@ -54,6 +60,8 @@ struct Part {
 struct NpzReader {
     input: Arc<Input>,
     arrays: Vec<Part>,
+    /// Time and step, if there are any.
+    clock: [Option<(File, Array)>; 2],
     frames: u64,
     left_out: Vec<String>,
 }
@@ -160,6 +168,10 @@ impl NpzReader {
         self.frames = found.frames.unwrap_or(1);
         for (i, (file, array)) in arrays.into_iter().enumerate() {
             let bare = found.bare == Some(i);
+            if let Some(hand) = self.hand(&file.name, &array).filter(|_| !bare) {
+                self.clock[hand] = Some((file, array));
+                continue;
+            }
             let view = if bare { array.table() } else { array.beside(found.frames, found.rows) };
             match view {
                 Some(view) if view.columns.0 <= 9 || bare => {
@@ -173,6 +185,28 @@ impl NpzReader {
             }
         }
         Ok(())
+    }
+
+    /// Whether an array is the time (0) or the step (1) of the frames: one number for all, or one for each.
+    fn hand(&self, name: &str, array: &Array) -> Option<usize> {
+        let hand = ["time", "step"].iter().position(|word| name.eq_ignore_ascii_case(word))?;
+        let numbers = array.shape.iter().product::<u64>();
+        let alone = !array.is_record && array.items.len() == 1 && array.shape.len() < 2;
+        (alone && (numbers == 1 || numbers == self.frames)).then_some(hand)
+    }
+
+    /// The time (0) or the step (1) of a frame.
+    fn clock(&mut self, hand: usize, frame: u64) -> Result<Option<f64>> {
+        let Some((file, array)) = &mut self.clock[hand] else { return Ok(None) };
+        let Some(Item { scalar, order, .. }) = array.items.first().cloned() else {
+            return Ok(None);
+        };
+        let numbers = array.shape.iter().product::<u64>();
+        let bytes = scalar.bytes();
+        let at = array.start + if numbers > 1 { frame * bytes as u64 } else { 0 };
+        let data = file.read(&self.input, at, bytes as u64)?;
+        let lane = Lane { bytes: &data, start: 0, stride: bytes, scalar, order };
+        Ok(lane.holds(1).then(|| lane.number(0)))
     }
 
     /// The bytes of `part` that hold `frame`, and where the frame's first row lies in them.
@@ -237,7 +271,10 @@ impl Reader for NpzReader {
         if rows > 0 {
             table.push(&lanes, rows);
         }
-        Ok(table.finish())
+        let mut particles = table.finish();
+        particles.time = self.clock(0, frame as u64)?.filter(|time| time.is_finite());
+        particles.step = self.clock(1, frame as u64)?.map(|step| step as i64);
+        Ok(particles)
     }
 
     fn warnings(&self) -> Vec<String> {
