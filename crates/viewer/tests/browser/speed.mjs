@@ -2,7 +2,8 @@
 //
 //     node crates/viewer/tests/browser/speed.mjs SOURCE… [-- ARGUMENTS of motes view]
 //
-// MOTES, MOTES_BROWSER and CHROMIUM as for the tests. Prints one JSON object for each source:
+// MOTES, MOTES_BROWSER and CHROMIUM as for the tests; MOTES_SPEED_SECS, how long each takes, and MOTES_SPEED_KINDS, such as
+// `orbit,plane`. Prints one JSON object for each source:
 //
 // - `address`, `first`: from the start of the program to its address, and to the first picture in the browser, ms;
 // - `exact`: from the start to the exact picture, ms;
@@ -99,6 +100,7 @@ async function play(seconds) {
   return { 'frames/s': Math.round((10 * count) / seconds) / 10, frames: new Set(frames).size };
 }
 
+// The browser starts before anything is measured.
 const blank = await visit('about:blank');
 for (const source of sources) {
   const start = performance.now();
