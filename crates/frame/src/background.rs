@@ -28,16 +28,23 @@ impl Background {
             return;
         }
         let (width, rows) = (frame.width(), frame.height());
-        frame.color_mut().par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
-            let behind = self.in_row(row, rows);
-            for pixel in pixels {
-                let through = 1.0 - pixel[3].clamp(0.0, 1.0);
-                for (over, under) in pixel.iter_mut().zip(behind) {
-                    *over += under * through;
-                }
-                pixel[3] = 1.0;
+        let all = frame.color_mut().par_chunks_mut(width).enumerate();
+        all.for_each(|(row, pixels)| self.put_behind_row(pixels, (row, rows)));
+    }
+
+    /// Composites row `row` of `rows` over this background.
+    pub(crate) fn put_behind_row(self, pixels: &mut [[f32; 4]], (row, rows): (usize, usize)) {
+        if self == Background::Transparent {
+            return;
+        }
+        let behind = self.in_row(row, rows);
+        for pixel in pixels {
+            let through = 1.0 - pixel[3].clamp(0.0, 1.0);
+            for (over, under) in pixel.iter_mut().zip(behind) {
+                *over += under * through;
             }
-        });
+            pixel[3] = 1.0;
+        }
     }
 
     fn in_row(self, row: usize, rows: usize) -> [f32; 3] {

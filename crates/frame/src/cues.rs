@@ -23,7 +23,7 @@ use fearless_simd::{Level, dispatch, f32x4, prelude::*};
 use fearless_simd_macros::simd;
 use rayon::prelude::*;
 
-use crate::{Frame, FrameError, Result};
+use crate::{Background, Frame, FrameError, Result};
 use halo::{Counts, Shade};
 use lines::Lines;
 use patch::{Layers, Patch};
@@ -99,14 +99,16 @@ struct Amounts {
 }
 
 impl Cues {
-    /// Draws the cues into the colours of `frame`, which are linear and premultiplied; it belongs between tone
-    /// and background. The layers stay as they are. The same bits for any number of threads.
+    /// Draws the cues into the colours of `frame`, which are linear and premultiplied and have their tone, and puts
+    /// `background` behind, while the rows are at hand. The layers stay as they are. The same bits for any number of
+    /// threads.
     ///
     /// # Errors
     /// The frame has no layer of depth, or none of normals.
-    pub fn draw(&self, frame: &mut Frame, level: Level) -> Result<()> {
+    pub fn draw(&self, frame: &mut Frame, background: Background, level: Level) -> Result<()> {
         let size = [frame.width(), frame.height()];
         if size[0] * size[1] == 0 || !self.any() {
+            background.put_behind(frame);
             return Ok(());
         }
         let (color, layers) = frame.color_and_layers();
@@ -115,7 +117,10 @@ impl Cues {
         let rows = color.par_chunks_mut(ROWS * size[0]).enumerate();
         rows.for_each_init(Work::default, |work, (number, rows)| {
             let of = (&layers, shade.as_ref());
-            dispatch!(level, simd => work.draw(simd, self, of, (number * ROWS, rows)));
+            dispatch!(level, simd => work.draw(simd, self, of, (number * ROWS, &mut *rows)));
+            for (row, pixels) in rows.chunks_mut(size[0]).enumerate() {
+                background.put_behind_row(pixels, (number * ROWS + row, size[1]));
+            }
         });
         Ok(())
     }

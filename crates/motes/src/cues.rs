@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 use glam::DVec3;
-use motes_frame::{Cues, Eye, Fade, Frame, Stroke};
+use motes_frame::{Background, Cues, Eye, Fade, Frame, Stroke};
 use motes_scene::{CameraView, Color, Cue, Projection, Resolved};
 
 use crate::Result;
@@ -14,14 +14,15 @@ const STRUCTURE: f64 = 4.0;
 /// How many particles tell what is typical.
 const SAMPLE: usize = 1000;
 
-/// Draws the cues that are on into `shown`, which has the picture's tone but no background yet.
+/// Draws the cues that are on into `shown`, which has the picture's tone, and puts the background behind.
 pub(crate) fn draw(
     cue: &Cue,
     resolved: &Resolved,
     systems: &[Loaded],
-    shown: &mut Frame,
+    (shown, background): (&mut Frame, Background),
 ) -> Result<()> {
     if !cue.any() {
+        background.put_behind(shown);
         return Ok(());
     }
     let stroke = |word: &str, (strength, width): (f64, f64), color: Color| {
@@ -41,7 +42,7 @@ pub(crate) fn draw(
         rim: stroke("rim", (cue.rim, cue.rim_width), cue.rim_color),
         depth: cue.has("depth").then(fade),
     };
-    Ok(cues.draw(shown, Level::new())?)
+    Ok(cues.draw(shown, background, Level::new())?)
 }
 
 fn eye(view: &CameraView) -> Eye {

@@ -204,11 +204,13 @@ fn with_layers(
     mut seen: motes_spheres::Layers,
     entries: &Entries<'_>,
 ) -> Result<Frame> {
-    // Where nothing is, the system is 0.
-    let number = |(system, id): (&mut u16, &i64)| {
-        *system = if *id < 0 { 0 } else { entries.system(*system).number };
-    };
-    seen.system.par_iter_mut().with_min_len(1 << 14).zip(&seen.id).for_each(number);
+    if !entries.are_systems() {
+        // Where nothing is, the system is 0.
+        let number = |(system, id): (&mut u16, &i64)| {
+            *system = if *id < 0 { 0 } else { entries.system(*system).number };
+        };
+        seen.system.par_iter_mut().with_min_len(1 << 14).zip(&seen.id).for_each(number);
+    }
     Ok(frame
         .with(Layer::Depth(seen.depth))?
         .with(Layer::Normal(seen.normal))?

@@ -30,6 +30,12 @@ impl<'a> Entries<'a> {
         entries
     }
 
+    /// Whether entries are numbered as the scene's systems are.
+    pub fn are_systems(&self) -> bool {
+        let numbers = self.of.iter().map(|of| usize::from(self.loaded[*of].number));
+        numbers.eq(0..self.of.len())
+    }
+
     /// The system of an entry.
     pub fn system(&self, entry: u16) -> &'a Loaded {
         &self.loaded[self.of[entry as usize]]

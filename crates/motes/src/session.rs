@@ -530,7 +530,6 @@ impl Session {
             motes_scene::Tone::Filmic => Curve::Filmic,
         };
         Tone { exposure: image.exposure as f32, curve }.apply(&mut shown);
-        crate::cues::draw(&self.scene.cue, resolved, annotated.systems, &mut shown)?;
         let background = match (image.transparent, image.background_bottom) {
             (true, _) => Background::Transparent,
             (false, None) => Background::Solid(resolved.background.top.to_array()),
@@ -539,7 +538,8 @@ impl Session {
                 bottom: resolved.background.bottom.to_array(),
             },
         };
-        background.put_behind(&mut shown);
+        let systems = annotated.systems;
+        crate::cues::draw(&self.scene.cue, resolved, systems, (&mut shown, background))?;
         annotations(&self.scene, resolved, annotated).draw(&mut shown);
         Ok(shown)
     }

@@ -65,7 +65,7 @@ fn stroke(width: f32) -> Option<Stroke> {
 
 /// How dark each pixel has become, 0 … 1, and where it is from `middle`: the angle and the distance.
 fn darkness(cues: &Cues, mut frame: Frame) -> Vec<f32> {
-    cues.draw(&mut frame, Level::new()).unwrap();
+    cues.draw(&mut frame, Background::Transparent, Level::new()).unwrap();
     frame.color().iter().map(|c| if c[3] > 0.0 { 1.0 - c[0] / c[3] } else { 0.0 }).collect()
 }
 
@@ -106,7 +106,7 @@ fn a_sphere_has_a_round_outline_without_stairs() {
     let dark = {
         // Where the line lies on nothing, it has only alpha.
         let mut frame = frame;
-        cues.draw(&mut frame, Level::new()).unwrap();
+        cues.draw(&mut frame, Background::Transparent, Level::new()).unwrap();
         assert_eq!(frame.layers(), before.layers());
         let colors = frame.color().iter().zip(before.color());
         colors.map(|(c, b)| if b[3] > 0.0 { 1.0 - c[0] } else { c[3] }).collect::<Vec<_>>()
@@ -220,7 +220,9 @@ fn depth_fades_into_the_background_or_towards_a_color() {
     let fade = |color| Some(Fade { strength: 0.8, color });
     let faded = |color, distance: f32| {
         let mut frame = wall(|_, _| distance, [0.0, 0.0, -1.0]);
-        Cues { depth: fade(color), ..cues() }.draw(&mut frame, Level::new()).unwrap();
+        Cues { depth: fade(color), ..cues() }
+            .draw(&mut frame, Background::Transparent, Level::new())
+            .unwrap();
         frame.color()[at([30, 40])]
     };
     assert_eq!(faded(None, 0.0), [1.0; 4]);
@@ -275,7 +277,7 @@ fn the_same_bits_for_any_number_of_threads() {
     let hash = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut frame = picture(&balls, SIZE);
-        pool.install(|| all.draw(&mut frame, Level::new())).unwrap();
+        pool.install(|| all.draw(&mut frame, Background::Transparent, Level::new())).unwrap();
         frame.hash()
     };
     let one = hash(1);
@@ -288,7 +290,7 @@ fn a_picture_twice_as_large_looks_the_same() {
     let cues = Cues { edges: stroke(3.0), structure: 30.0, ..cues() };
     let inked = |scale: usize| {
         let mut frame = picture(&[ball(scale as f32)], SIZE.map(|n| n * scale));
-        cues.draw(&mut frame, Level::new()).unwrap();
+        cues.draw(&mut frame, Background::Transparent, Level::new()).unwrap();
         let dark: f32 = frame.color().iter().map(|c| c[3] - c[0]).sum();
         dark / (scale * scale) as f32
     };
@@ -299,14 +301,16 @@ fn a_picture_twice_as_large_looks_the_same() {
 #[test]
 fn without_layers_there_is_an_error_and_without_cues_nothing() {
     let mut frame = Frame::new(1, 1, vec![[1.0; 4]]).unwrap();
-    Cues::default().draw(&mut frame, Level::new()).unwrap();
-    let error = Cues { edges: stroke(2.0), ..cues() }.draw(&mut frame, Level::new()).unwrap_err();
+    Cues::default().draw(&mut frame, Background::Transparent, Level::new()).unwrap();
+    let error = Cues { edges: stroke(2.0), ..cues() }
+        .draw(&mut frame, Background::Transparent, Level::new())
+        .unwrap_err();
     assert_eq!(error.to_string(), "the frame has no layer `depth`");
     // Pictures of one row, of one column, of one pixel.
     for size in [[1, 1], [7, 1], [1, 7], [2, 2]] {
         let mut frame = picture(&[Ball([0.7, 0.6], 1.5, 0.0)], size);
         let all = Cues { edges: stroke(2.0), seam: stroke(1.0), halo: stroke(3.0), ..cues() };
-        all.draw(&mut frame, Level::new()).unwrap();
+        all.draw(&mut frame, Background::Transparent, Level::new()).unwrap();
         assert!(frame.color().iter().flatten().all(|c| c.is_finite()));
     }
 }

@@ -117,7 +117,6 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
                 |path: &String| ["system", "section"].iter().any(|p| path.starts_with(p));
             if changes.keys().any(of_particles) {
                 stand(&mut scene.camera, &seen.resolved.view);
-                state.settle(|camera| stand(camera, &seen.resolved.view));
             }
         }
         state.change(scene, ends)
