@@ -346,27 +346,27 @@ fn masks_move_the_surface_by_less_than_a_voxel() {
     let (depths, colors, all) = picture(&Params { rough: false, ..params }, None);
     let (masked, tinted, written) = picture(&Params { masked: true, ..params }, Some(&masks()));
     assert!(all > 3 * written, "{all} {written}");
-    let (mut off, mut sum, mut both, mut one) = (0.0_f32, 0.0, 0, 0);
-    let mut color = 0.0;
+    let (mut shifts, mut tints, mut one) = (Vec::new(), Vec::new(), 0);
     for i in 0..depths.len() {
-        color += (0..3).map(|c| f64::from((colors[i][c] - tinted[i][c]).abs())).sum::<f64>() / 3.0;
+        tints.push((0..3).map(|c| (colors[i][c] - tinted[i][c]).abs()).sum::<f32>() / 3.0);
         match (depths[i].is_finite(), masked[i].is_finite()) {
-            (true, true) => {
-                let d = (depths[i] - masked[i]).abs();
-                sum += f64::from(d);
-                both += 1;
-                // Behind an edge that moves, another surface is seen.
-                off = if d < 3.0 { off.max(d) } else { off };
-                one += u32::from(d >= 3.0);
-            }
+            (true, true) => shifts.push((depths[i] - masked[i]).abs()),
             (false, false) => {}
             _ => one += 1,
         }
     }
-    let (mean, color) = (sum / f64::from(both), color / depths.len() as f64);
-    assert!(both > 3000 && mean < 0.25, "{mean} {off} {one} of {both}");
-    assert!(one < both / 50, "{one} of {both}");
-    assert!(color < 0.02, "{color}");
+    let both = shifts.len();
+    let spread = |mut all: Vec<f32>| {
+        all.sort_by(f32::total_cmp);
+        let mean = all.iter().sum::<f32>() / all.len() as f32;
+        [mean, all[all.len() * 98 / 100], all[all.len() - 1]]
+    };
+    let ([shift, most_shift, far], [tint, most_tint, worst]) = (spread(shifts), spread(tints));
+    let found = format!("{shift} {most_shift} {far}, {tint} {most_tint} {worst}, {one} of {both}");
+    // Voxels, and light. Behind an edge that moves, another surface is seen: the largest differences are these.
+    assert!(both > 3000 && one < both / 50, "{found}");
+    assert!(shift < 0.25 && most_shift < 1.0, "{found}");
+    assert!(tint < 0.02 && most_tint < 0.3, "{found}");
 }
 
 #[test]
