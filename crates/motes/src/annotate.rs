@@ -66,7 +66,7 @@ fn fills(sim_box: &SimulationBox, low: [f64; 3], high: [f64; 3]) -> bool {
         let along = corners.map(|c| c[axis]);
         let least = along.into_iter().fold(f64::INFINITY, f64::min);
         let greatest = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        high[axis] - low[axis] >= FILLED * (greatest - least)
+        high[axis].min(greatest) - low[axis].max(least) >= FILLED * (greatest - least)
     })
 }
 

@@ -27,10 +27,19 @@ impl SharedGrids {
         same.find(|known| Weak::as_ptr(&known.particles) == Arc::as_ptr(particles))?.grids.upgrade()
     }
 
-    /// Lets others have grids.
-    pub fn put(&self, particles: &Arc<Particles>, key: GridKey, grids: &Arc<RadiusClasses>) {
-        let (particles, grids) = (Arc::downgrade(particles), Arc::downgrade(grids));
-        self.known().push(Known { particles, key, grids });
+    /// Lets others have grids; gives those that somebody else has made meanwhile, if there are any.
+    pub fn put(
+        &self,
+        particles: &Arc<Particles>,
+        key: GridKey,
+        grids: Arc<RadiusClasses>,
+    ) -> Arc<RadiusClasses> {
+        if let Some(others) = self.find(particles, &key) {
+            return others;
+        }
+        let known = (Arc::downgrade(particles), Arc::downgrade(&grids));
+        self.known().push(Known { particles: known.0, key, grids: known.1 });
+        grids
     }
 
     /// Keeps grids from others, as they are to be changed.

@@ -315,6 +315,9 @@ impl Session {
         stats.ms.insert("build", milliseconds(start));
         self.note_left_out(&loaded, shot.frame);
         self.note_unknown(&loaded);
+        if !loaded.is_empty() && loaded.iter().all(|l| l.particles.is_empty()) {
+            self.note(format!("frame {} has no particles", shot.frame));
+        }
 
         let scene = self.scene_of(shot);
         let resolved = scene.resolve_framing(boxes.framing(&self.scene, &loaded))?;
@@ -346,9 +349,14 @@ impl Session {
                 l.classes.left_out,
                 l.particles.len()
             );
-            if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
-                self.notes.push(note);
-            }
+            self.note(note);
+        }
+    }
+
+    /// Keeps something that is to be told, once.
+    fn note(&mut self, note: String) {
+        if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
+            self.notes.push(note);
         }
     }
 
@@ -362,10 +370,7 @@ impl Session {
             let lacks =
                 |l: &Loaded| l.visible.unknown().iter().any(|u| u == &(*section, name.clone()));
             if loaded.iter().filter(cuts).all(lacks) {
-                let note = format!("section.{section}.types: no particle is of type '{name}'");
-                if self.notes.len() < MOST_NOTES && !self.notes.contains(&note) {
-                    self.notes.push(note);
-                }
+                self.note(format!("section.{section}.types: no particle is of type '{name}'"));
             }
         }
     }

@@ -193,9 +193,9 @@ impl Stages {
             positions.to_mut().iter_mut().for_each(about);
         }
         let classes = radius::classes(memory, positions, rule, key.scale as f32, params);
-        let classes = Arc::new(classes);
+        let mut classes = Arc::new(classes);
         if let Some(shared) = &self.shared {
-            shared.put(particles, key.clone(), &classes);
+            classes = shared.put(particles, key.clone(), classes);
         }
         self.grids = Some((key.clone(), classes));
     }

@@ -232,9 +232,9 @@ fn sweep_rows([mut a, mut b]: [Row<'_>; 2], scale: &Scale) {
 fn drawn(own: f32, before: f32, (factor, scale): (f32, &Scale)) -> f32 {
     let per_leap = 1.0 / scale.leap(own);
     let difference = before - own;
-    let part = difference * per_leap;
-    // Not a number is less than nothing.
-    own + factor * (1.0 - part * part).max(0.0) * if difference.is_nan() { 0.0 } else { difference }
+    let known = if difference.is_nan() { 0.0 } else { difference };
+    let part = known * per_leap;
+    own + factor * (1.0 - part * part).max(0.0) * known
 }
 
 /// A part of a list of values for each strip, and in it for each row.
@@ -292,10 +292,11 @@ fn draw<S: Simd>(simd: S, row: &mut [f32], (to, factors): (&[f32], &[f32]), scal
         let value = f32x16::from_slice(simd, own);
         let difference = f32x16::from_slice(simd, to) - value;
         let per_leap = 1.0 / (value * scale.leap[1] * value + scale.leap[0]);
-        let part = difference * per_leap;
         let zero = f32x16::splat(simd, 0.0);
-        let factor = f32x16::from_slice(simd, factor) * (1.0 - part * part).max(zero);
+        // What is not a number is not equal to itself.
         let known = difference.simd_eq(difference).select(difference, zero);
+        let part = known * per_leap;
+        let factor = f32x16::from_slice(simd, factor) * (1.0 - part * part).max(zero);
         (value + factor * known).store_slice(own);
     }
     let last = to.remainder().iter().zip(factors.remainder());

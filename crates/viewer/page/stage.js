@@ -12,8 +12,9 @@ const MOST_PIXELS = 3840 * 2160;
 const READING = 250;
 
 class Stage extends Part {
-  /** The size that was asked for, `1280×720`. */
+  /** The size of the picture, `1280×720`, and the one that was asked for. */
   size = '';
+  asked = '';
   /** Times of the last pictures. @type {number[]} */
   times = [];
   /** When the words were written last. */
@@ -31,7 +32,11 @@ class Stage extends Part {
     this.wait = h('div', { class: 'wait' }, h('span', { class: 'ring' }), h('span', {}, 'Opening…'));
     this.replaceChildren(this.canvas, h('motes-overlay'), this.hint, this.readout, h('motes-card'), this.wait);
     gestures(this.canvas);
-    store.measure = () => this.#measure();
+    store.measure = () => {
+      const size = this.#measure();
+      this.asked = this.size;
+      return size;
+    };
 
     new ResizeObserver(() => this.resized()).observe(this);
     this.listen(store, 'frame', (e) => this.#show(e.detail));
@@ -63,10 +68,13 @@ class Stage extends Part {
 
   /** Tells the server if the size has changed. */
   #resize() {
-    const before = this.size;
+    // What is hidden has no size.
+    if (this.clientWidth < 2 || this.clientHeight < 2) return;
     const size = this.#measure();
     store.tell('camera');
-    if (this.size !== before && store.line?.open) store.ask('resize', size);
+    if (this.size === this.asked || !store.line?.open) return;
+    this.asked = this.size;
+    store.ask('resize', size);
   }
 
   /** @param {import('./types.js').Frame} frame */

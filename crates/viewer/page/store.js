@@ -12,6 +12,9 @@ import { at, put, find } from './paths.js';
 
 /** @typedef {import('./types.js').Changes} Changes */
 
+/** Milliseconds between what panels are told while the camera moves. */
+const READING = 400;
+
 class Store extends EventTarget {
   constructor() {
     super();
@@ -54,6 +57,7 @@ class Store extends EventTarget {
     /** Whether it is being moved. */
     this.gliding = false;
     this.telling = false;
+    this.told = 0;
     this.aspect = 16 / 9;
     /** The size of the picture, device pixels: the stage knows it. @type {() => {width: number, height: number}} */
     this.measure = () => ({ width: 1280, height: 720 });
@@ -103,7 +107,7 @@ class Store extends EventTarget {
       if (is === 'hello') {
         this.tell('hello');
         this.tell('scene');
-      } else if (!this.gliding) this.#sceneLater();
+      } else if (!this.#resting()) this.#sceneLater();
       this.tell('camera');
     } else if (is === 'notice') this.notice(message.text, message.severity);
     else if (is !== 'systems') this.tell(is, message);
@@ -115,8 +119,14 @@ class Store extends EventTarget {
     this.telling = true;
     requestAnimationFrame(() => {
       this.telling = false;
+      this.told = performance.now();
       this.tell('scene');
     });
+  }
+
+  /** Whether panels rest: while the camera moves they need not be told more often than one reads. */
+  #resting() {
+    return this.gliding && performance.now() - this.told < READING;
   }
 
   /** The server's scene with what it has not answered yet. */
@@ -174,8 +184,7 @@ class Store extends EventTarget {
   async set(changes, mark = true) {
     this.scene = this.#with(this.scene, changes);
     this.pending = { ...this.pending, ...changes };
-    // While the camera moves, panels rest.
-    if (!this.gliding) this.#sceneLater();
+    if (!this.#resting()) this.#sceneLater();
     if (mark) return this.#flush(true);
     // What comes until the answer goes with the next.
     if (this.inFlight === 0) this.#flush(false).catch((e) => this.notice(e.message, 'error'));

@@ -113,14 +113,21 @@ fn set(guest: &Guest, fields: &Map<String, Value>) -> Result<()> {
         if let Some(seen) = &seen {
             inquire::check_changes((&scene, state.scene()), seen)?;
             // What comes and goes with a filter or a cut is not to move the camera.
-            let of_particles =
-                |path: &String| ["system", "section"].iter().any(|p| path.starts_with(p));
-            if changes.keys().any(of_particles) {
-                stand(&mut scene.camera, &seen.resolved.view);
+            let camera = |path: &String| path.starts_with("camera");
+            if changes.keys().any(|path| hides(path)) && !changes.keys().any(camera) {
+                // As it would stand now: what was seen last may be of another camera.
+                let before = state.seen();
+                stand(&mut scene.camera, &before.resolve_framing(seen.framing(&before))?.view);
             }
         }
         state.change(scene, ends)
     })
+}
+
+/// Whether a parameter decides which particles are seen.
+fn hides(path: &str) -> bool {
+    let of_system = ["where", "filter", "visible"].iter().any(|word| path.contains(word));
+    path.starts_with("section") || (path.starts_with("system") && of_system)
 }
 
 /// Puts a JSON value into the scene; none is the default.

@@ -27,6 +27,8 @@ pub(super) struct Pace {
     step: usize,
     /// What pictures took at each step: how much that counts, and the mean in seconds.
     took: [(f64, f64); STEPS.len()],
+    /// The canvas that these were for, million pixels.
+    canvas: f64,
     /// The part of a picture's time that does not depend on its size, as it was found last.
     fixed: f64,
 }
@@ -40,6 +42,9 @@ impl Pace {
         drawing: Duration,
         encoding: Duration,
     ) {
+        if self.canvas != canvas {
+            (self.canvas, self.took) = (canvas, Default::default());
+        }
         let time = drawing.as_secs_f64() + encoding.as_secs_f64() * megapixels;
         for (weight, _) in &mut self.took {
             *weight *= MEMORY;

@@ -387,6 +387,7 @@ impl View for Guest {
         let studio = &mut *studio;
         if link.anew {
             studio.drawn = None;
+            studio.warned.clear();
         }
         let look_again = self.keep_up(tell);
         let wait = self.go_on(&studio.session, tell).or(look_again);

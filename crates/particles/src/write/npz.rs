@@ -28,10 +28,11 @@ pub(super) fn write(particles: &Particles, out: impl Write + Seek) -> io::Result
     for column in &particles.columns {
         array(&mut archive, (&column.name, column.components, count), &plain(column))?;
     }
-    if let Some(time) = particles.time {
+    // A property of that name comes first.
+    if let Some(time) = particles.time.filter(|_| particles.column("time").is_none()) {
         array(&mut archive, ("time", 1, 1), &Values::F64(vec![time]))?;
     }
-    if let Some(step) = particles.step {
+    if let Some(step) = particles.step.filter(|_| particles.column("step").is_none()) {
         array(&mut archive, ("step", 1, 1), &Values::I64(vec![step]))?;
     }
     archive.finish()?.flush()

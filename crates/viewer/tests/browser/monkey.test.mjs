@@ -27,7 +27,7 @@ test('random use', { timeout: 180_000 + 1000 * LONG }, async (t) => {
   await seen.exact();
   const roll = dice(20261122);
   const keys = ['ArrowLeft', 'ArrowUp', '+', '-', '[', ']', 'f', 'o', 'p', '1', '5', '.', ',', 'Control+z', 'Control+Shift+z', 'Escape', 'm', 'b', 'w', 's', ' '];
-  const panels = ['look', 'types', 'filter', 'light', 'picture', 'ask', 'all', 'log'];
+  const panels = ['look', 'types', 'filter', 'cut', 'light', 'picture', 'ask', 'all', 'log'];
   const actions = [
     () => seen.drag(roll(300) - 150, roll(300) - 150, { button: ['left', 'middle', 'right'][roll(3)] }),
     () => seen.page.mouse.wheel(0, roll(800) - 400),

@@ -168,7 +168,7 @@ impl NpzReader {
         self.frames = found.frames.unwrap_or(1);
         for (i, (file, array)) in arrays.into_iter().enumerate() {
             let bare = found.bare == Some(i);
-            if let Some(hand) = self.hand(&file.name, &array).filter(|_| !bare) {
+            if let Some(hand) = self.hand(&file.name, &array, found.rows).filter(|_| !bare) {
                 self.clock[hand] = Some((file, array));
                 continue;
             }
@@ -187,12 +187,15 @@ impl NpzReader {
         Ok(())
     }
 
-    /// Whether an array is the time (0) or the step (1) of the frames: one number for all, or one for each.
-    fn hand(&self, name: &str, array: &Array) -> Option<usize> {
+    /// Whether an array is the time (0) or the step (1) of the frames: one number for all, or one for each. Of one
+    /// particle alone, a list of one number may as well be its own.
+    fn hand(&self, name: &str, array: &Array, rows: u64) -> Option<usize> {
         let hand = ["time", "step"].iter().position(|word| name.eq_ignore_ascii_case(word))?;
         let numbers = array.shape.iter().product::<u64>();
-        let alone = !array.is_record && array.items.len() == 1 && array.shape.len() < 2;
-        (alone && (numbers == 1 || numbers == self.frames)).then_some(hand)
+        let one = numbers == 1 && (rows != 1 || array.shape.is_empty());
+        let each = self.frames > 1 && numbers == self.frames && array.shape[0] == numbers;
+        let plain = !array.is_record && array.items.len() == 1 && self.clock[hand].is_none();
+        (plain && (one || each)).then_some(hand)
     }
 
     /// The time (0) or the step (1) of a frame.
@@ -273,7 +276,9 @@ impl Reader for NpzReader {
         }
         let mut particles = table.finish();
         particles.time = self.clock(0, frame as u64)?.filter(|time| time.is_finite());
-        particles.step = self.clock(1, frame as u64)?.map(|step| step as i64);
+        // A length of steps is not a step.
+        let whole = |step: &f64| step.fract() == 0.0 && step.abs() < 9e15;
+        particles.step = self.clock(1, frame as u64)?.filter(whole).map(|step| step as i64);
         Ok(particles)
     }
 
