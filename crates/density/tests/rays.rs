@@ -101,8 +101,7 @@ fn first_kept(
     let lattice = &field.lattice;
     let liquid = |t: f32| field.at(lattice.place(ray.0 + ray.1 * t)) >= threshold;
     let kept = |t: f32| plane.height(ray.0 + ray.1 * t) >= 0.0;
-    let steps = (0..8000).map(|i| i as f32 * STEP);
-    let at = steps.into_iter().find(|t| liquid(*t) && kept(*t))?;
+    let at = (0..8000).map(|i| i as f32 * STEP).find(|t| liquid(*t) && kept(*t))?;
     Some((at, !kept(at - STEP)))
 }
 
@@ -350,7 +349,12 @@ fn masks_move_the_surface_by_less_than_a_voxel() {
     for i in 0..depths.len() {
         tints.push((0..3).map(|c| (colors[i][c] - tinted[i][c]).abs()).sum::<f32>() / 3.0);
         match (depths[i].is_finite(), masked[i].is_finite()) {
-            (true, true) => shifts.push((depths[i] - masked[i]).abs()),
+            (true, true) => {
+                let shift = (depths[i] - masked[i]).abs();
+                // Behind an edge that moves, another surface is seen.
+                one += usize::from(shift >= 3.0);
+                shifts.push(shift);
+            }
             (false, false) => {}
             _ => one += 1,
         }
@@ -363,7 +367,7 @@ fn masks_move_the_surface_by_less_than_a_voxel() {
     };
     let ([shift, most_shift, far], [tint, most_tint, worst]) = (spread(shifts), spread(tints));
     let found = format!("{shift} {most_shift} {far}, {tint} {most_tint} {worst}, {one} of {both}");
-    // Voxels, and light. Behind an edge that moves, another surface is seen: the largest differences are these.
+    // Voxels, and light.
     assert!(both > 3000 && one < both / 50, "{found}");
     assert!(shift < 0.25 && most_shift < 1.0, "{found}");
     assert!(tint < 0.02 && most_tint < 0.3, "{found}");

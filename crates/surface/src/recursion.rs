@@ -8,10 +8,11 @@
 //!
 //! once in each direction: each sweep has the variance a/(1 − a)², so that with `ROUNDS` rounds and the
 //! standard deviation σ pixels, a/(1 − a)² = v = σ²/(2·ROUNDS) and a = (1 + 2·v − √(1 + 4·v)) / (2·v).
-//! A sweep begins anew where a surface ends, and where it leaps by `LEAP` σ from one pixel to the next, as what lies there
-//! before something else is not smeared over it. What leaps by less is drawn the less the more it leaps, a·(1 − (leap/LEAP)²):
-//! at rims, where depth falls ever faster, neighbouring columns would else end at different places, and show as streaks. What is no thicker than a ball,
-//! a drop, stays round; from there on smoothing sets in with thickness.
+//! A sweep begins anew where a surface ends, and where it leaps by `LEAP` σ from one pixel to the next, as what
+//! lies there before something else is not smeared over it. What leaps by less is drawn the less the more it
+//! leaps, a·(1 − (leap/LEAP)²): at rims, where depth falls ever faster, neighbouring columns would else end at
+//! different places, and show as streaks. What is no thicker than a ball, a drop, stays round; from there on
+//! smoothing sets in with thickness.
 //!
 //! Surfaces stay in the order of columns, and links become distances in it: a sweep is a loop without
 //! guesses. Along a row each value waits for the one before; along columns a row is drawn at once.
