@@ -1,4 +1,4 @@
-//! Particles by tile: a tile is a bundle of rows of voxels along x, and knows all particles that reach it.
+//! Particles by tile: a tile is a bundle of rows of cells along x, and has the particles in it.
 //!
 //! Each chunk of the input sorts its own particles, stably; a tile goes through the chunks in their order.
 //! So what a tile adds up does not depend on the number of threads.
@@ -9,11 +9,14 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::lattice::{Lattice, reach};
-use crate::params::{Params, Particles};
+use crate::lattice::Lattice;
+use crate::params::Particles;
 
-/// Particles in a chunk.
-const CHUNK: usize = 1 << 12;
+/// Particles in a chunk, at the least, and chunks at the most: each knows where all tiles begin.
+const LEAST_CHUNK: usize = 1 << 11;
+const MOST_CHUNKS: usize = 64;
+/// Particles that are worth a look of their own.
+const SURVEYED: usize = 1 << 12;
 
 /// A particle in a tile.
 #[repr(C)]
@@ -25,10 +28,18 @@ pub(crate) struct Entry {
     pub index: u32,
 }
 
+impl Entry {
+    /// The cell that it is in.
+    #[inline(always)]
+    pub fn cell(&self) -> [usize; 3] {
+        self.at.map(|v| v as u32 as usize)
+    }
+}
+
 /// Where tiles lie: along y and z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tiles {
-    /// Rows along an edge.
+    /// Rows of cells along an edge: a power of two.
     pub edge: usize,
     /// Tiles along y and z.
     pub dims: [usize; 2],
@@ -43,16 +54,9 @@ impl Tiles {
         self.dims[0] * self.dims[1]
     }
 
-    /// The tile of a row.
-    #[inline(always)]
-    pub fn of_row(&self, [y, z]: [usize; 2]) -> usize {
-        z / self.edge * self.dims[0] + y / self.edge
-    }
-
-    /// The rows of a tile, along y and z.
-    pub fn rows(&self, tile: usize, lattice: &Lattice) -> [Range<usize>; 2] {
-        let first = [tile % self.dims[0], tile / self.dims[0]].map(|t| t * self.edge);
-        [0, 1].map(|a| first[a]..(first[a] + self.edge).min(lattice.dims[a + 1]))
+    /// Its first rows of cells, along y and z.
+    pub fn first(&self, tile: usize) -> [usize; 2] {
+        [tile % self.dims[0], tile / self.dims[0]].map(|t| t * self.edge)
     }
 }
 
@@ -68,15 +72,9 @@ struct Chunk {
     /// First entry of each tile, and their number.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    /// Where the particles go, before they are sorted.
-    spans: Vec<Span>,
-}
-
-/// A particle and the tiles that it reaches: first and last along y, along z.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    entry: Entry,
-    tiles: [[u16; 2]; 2],
+    /// Its particles, and their tiles, before they are sorted.
+    found: Vec<Entry>,
+    tiles: Vec<u32>,
 }
 
 /// What is known of particles before there is a lattice.
@@ -101,12 +99,12 @@ impl Survey {
 
     /// Of all particles that can be drawn.
     pub fn new(particles: &Particles<'_>) -> Self {
-        let chunks = particles.positions.par_chunks(CHUNK).enumerate();
+        let chunks = particles.positions.par_chunks(SURVEYED).enumerate();
         let parts: Vec<Self> = chunks
             .map(|(chunk, positions)| {
                 let mut part = Self::NONE;
                 for (i, position) in positions.iter().enumerate() {
-                    let radius = particles.radius(chunk * CHUNK + i);
+                    let radius = particles.radius(chunk * SURVEYED + i);
                     let point = Vec3::from_array(*position);
                     if drawable(point, radius) {
                         part.low = part.low.min(point);
@@ -135,30 +133,20 @@ fn drawable(point: Vec3, radius: f32) -> bool {
 
 impl Bins {
     /// Sorts particles into tiles of `edge` rows.
-    pub fn fill(
-        &mut self,
-        particles: &Particles<'_>,
-        lattice: &Lattice,
-        (params, edge): (&Params, usize),
-    ) {
+    pub fn fill(&mut self, particles: &Particles<'_>, lattice: &Lattice, edge: usize) {
         self.tiles = Tiles::new(lattice, edge);
-        let tiles = self.tiles;
-        self.chunks.resize_with(particles.positions.len().div_ceil(CHUNK), Chunk::default);
-        self.chunks.par_iter_mut().enumerate().for_each(|(number, chunk)| {
-            let end = ((number + 1) * CHUNK).min(particles.positions.len());
-            chunk.find(particles, number * CHUNK..end, (lattice, params, tiles));
+        let (tiles, count) = (self.tiles, particles.positions.len());
+        let size = count.div_ceil(MOST_CHUNKS).max(LEAST_CHUNK);
+        self.chunks.resize_with(count.div_ceil(size), Chunk::default);
+        self.chunks.par_iter_mut().enumerate().with_max_len(1).for_each(|(number, chunk)| {
+            chunk.find(particles, number * size..((number + 1) * size).min(count), lattice, tiles);
             chunk.sort(tiles);
         });
     }
 
-    /// The particles that reach a tile.
-    pub fn of(&self, tile: usize) -> impl Iterator<Item = &Entry> {
-        self.chunks.iter().flat_map(move |chunk| chunk.of(tile))
-    }
-
-    /// The same, chunk by chunk.
-    pub fn parts(&self, tile: usize) -> impl Iterator<Item = &[Entry]> {
-        self.chunks.iter().map(move |chunk| chunk.of(tile))
+    /// The particles of a tile, chunk by chunk.
+    pub fn of(&self, tile: usize) -> impl Iterator<Item = &[Entry]> + Clone {
+        self.chunks.iter().map(move |chunk| chunk.of(tile)).filter(|entries| !entries.is_empty())
     }
 }
 
@@ -167,63 +155,57 @@ impl Chunk {
         &self.entries[self.starts[tile] as usize..self.starts[tile + 1] as usize]
     }
 
-    /// Finds where the particles of a range go.
+    /// Finds where the particles of a range are.
     fn find(
         &mut self,
         particles: &Particles<'_>,
         range: Range<usize>,
-        (lattice, params, tiles): (&Lattice, &Params, Tiles),
+        lattice: &Lattice,
+        tiles: Tiles,
     ) {
-        self.spans.clear();
-        let last = tiles.dims.map(|n| (n - 1) as f32);
-        let per_tile = 1.0 / tiles.edge as f32;
+        self.found.clear();
+        self.tiles.clear();
+        let (shift, row) = (tiles.edge.trailing_zeros(), tiles.dims[0] as u32);
+        // They are inside, but for what coordinates far from 0 are rounded by.
+        let last = Vec3::from_array(lattice.cells().map(|n| (n - 1) as f32));
         for index in range {
             let point = Vec3::from_array(particles.positions[index]);
-            let radius = particles.radius(index);
-            if !drawable(point, radius) {
-                continue;
+            if drawable(point, particles.radius(index)) {
+                let at = lattice.place(point).max(Vec3::ZERO).min(last);
+                self.found.push(Entry { at: at.to_array(), index: index as u32 });
+                self.tiles.push((at.z as u32 >> shift) * row + (at.y as u32 >> shift));
             }
-            let far = reach(radius, lattice.voxel, params) / lattice.voxel;
-            let at = lattice.place(point).to_array();
-            let tile = |a: usize| {
-                let of = |place: f32| (place * per_tile).clamp(0.0, last[a]) as u16;
-                [of(at[a + 1] - far), of(at[a + 1] + far)]
-            };
-            let entry = Entry { at, index: index as u32 };
-            self.spans.push(Span { entry, tiles: [tile(0), tile(1)] });
         }
     }
 
-    /// Sorts them by tile, those that reach several into each.
+    /// Sorts them by tile.
     fn sort(&mut self, tiles: Tiles) {
-        self.starts.clear();
-        self.starts.resize(tiles.count() + 2, 0);
-        for span in &self.spans {
-            span.visit(tiles, |tile| self.starts[tile + 2] += 1);
-        }
-        for tile in 0..tiles.count() {
-            self.starts[tile + 2] += self.starts[tile + 1];
-        }
-        self.entries.resize(self.starts[tiles.count() + 1] as usize, Entry::default());
-        // Each start moves on to the next tile's as its entries come.
-        for span in &self.spans {
-            span.visit(tiles, |tile| {
-                let next = &mut self.starts[tile + 1];
-                self.entries[*next as usize] = span.entry;
-                *next += 1;
-            });
-        }
+        self.entries.resize(self.found.len(), Entry::default());
+        let Self { starts, entries, found, tiles: of, .. } = self;
+        sort(starts, tiles.count(), (of, found.iter()), entries);
     }
 }
 
-impl Span {
-    #[inline(always)]
-    fn visit(&self, tiles: Tiles, mut visit: impl FnMut(usize)) {
-        let [[y0, y1], [z0, z1]] = self.tiles;
-        for z in z0..=z1 {
-            for y in y0..=y1 {
-                visit(usize::from(z) * tiles.dims[0] + usize::from(y));
-            }
-        }
+/// Sorts entries by key, stably; leaves where each key's begin, and their number.
+#[inline(always)]
+pub(crate) fn sort<'a>(
+    starts: &mut Vec<u32>,
+    keys: usize,
+    (of, from): (&[u32], impl Iterator<Item = &'a Entry>),
+    to: &mut [Entry],
+) {
+    starts.clear();
+    starts.resize(keys + 2, 0);
+    for key in of {
+        starts[*key as usize + 2] += 1;
+    }
+    for key in 0..keys {
+        starts[key + 2] += starts[key + 1];
+    }
+    // Each start moves on to the next key's as its entries come.
+    for (entry, key) in from.zip(of) {
+        let next = &mut starts[*key as usize + 1];
+        to[*next as usize] = *entry;
+        *next += 1;
     }
 }

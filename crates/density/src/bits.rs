@@ -30,6 +30,12 @@ impl Bits {
         self.bits[(z * self.rows[0] + y) * self.words + x / 64] |= 1 << (x % 64);
     }
 
+    /// Whether a bit is set.
+    #[inline(always)]
+    pub fn get(&self, [x, y, z]: [usize; 3]) -> bool {
+        self.bits[(z * self.rows[0] + y) * self.words + x / 64] >> (x % 64) & 1 == 1
+    }
+
     /// Sets all within a cube of `half` cells around cells of `from` of which all within less are set
     /// already, but for one in `half`: itself and the cells `half` away. `flat` is for use meanwhile.
     pub fn spread(&mut self, from: &Self, half: usize, flat: &mut Self) {

@@ -10,12 +10,10 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::bins::Entry;
 use crate::bits::Bits;
 use crate::field::Field;
 use crate::params::{Params, Particles};
-
-/// Particles looked at in one go.
-const CHUNK: usize = 1 << 12;
 
 /// A ball, in voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,14 +40,21 @@ impl Drops {
         (particles, params): (&Particles<'_>, &Params),
         inside: &Bits,
     ) {
-        let chunks = particles.positions.par_chunks(CHUNK).enumerate();
-        let found: Vec<Vec<Drop>> = chunks
-            .map(|(chunk, positions)| {
-                let each = positions.iter().enumerate();
-                let drop = |(i, p): (usize, &[f32; 3])| {
-                    drop_of(field, ((*p).into(), chunk * CHUNK + i), (particles, params), inside)
-                };
-                each.filter_map(drop).collect()
+        let found: Vec<Vec<Drop>> = field
+            .desks()
+            .par_iter()
+            .map(|desk| {
+                let mut found = Vec::new();
+                for row in 0..desk.rows() {
+                    for x in 0..desk.across() {
+                        let (cell, own) = desk.cell(row, x);
+                        if !own.is_empty() && !inside.get(cell) {
+                            let drop = |e: &Entry| drop_of(field, e, (particles, params));
+                            found.extend(own.iter().filter_map(drop));
+                        }
+                    }
+                }
+                found
             })
             .collect();
         self.drops.clear();
@@ -144,20 +149,10 @@ fn cells_along(drop: &Drop, axis: usize, cells: usize) -> Range<usize> {
 /// A particle, if it is a drop.
 fn drop_of(
     field: &Field,
-    (point, index): (Vec3, usize),
+    entry: &Entry,
     (particles, params): (&Particles<'_>, &Params),
-    inside: &Bits,
 ) -> Option<Drop> {
-    let radius = particles.radius(index);
-    if !(point.is_finite() && radius > 0.0 && radius.is_finite()) {
-        return None;
-    }
-    let center = field.lattice.place(point);
-    let [x, y, z] = center.to_array().map(|v| v as usize);
-    let word = inside.bits[(z * inside.rows[0] + y) * inside.words + x / 64];
-    if word >> (x % 64) & 1 == 1 || field.at(center) >= params.threshold {
-        return None;
-    }
-    let radius = params.drop * radius / field.lattice.voxel;
-    Some(Drop { center, radius, index: index as u32 })
+    let (center, index) = (Vec3::from_array(entry.at), entry.index);
+    let radius = params.drop * particles.radius(index as usize) / field.lattice.voxel;
+    (field.at(center) < params.threshold).then_some(Drop { center, radius, index })
 }

@@ -4,19 +4,16 @@ use fearless_simd::{Level, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::bins::{Bins, Survey};
-use crate::fine::{self, LANES, Source, Tile};
+use crate::bins::{Bins, Survey, Tiles};
+use crate::fine::{self, Desk, Rows, Source, WIDE};
 use crate::lattice::{Lattice, reach};
 use crate::params::{Params, Particles};
 use crate::rough::{self, Rough};
 
-/// Rows along a tile's edge, at the least.
-const TILE: usize = 8;
+/// Rows of cells along a tile's edge, at the least.
+const TILE: usize = 4;
 /// Edge of a voxel in mean radii, at the least: finer ones would show nothing more.
 const LEAST_VOXEL: f32 = 0.25;
-/// Rows that are worth larger tiles, which fewer particles share.
-const MANY_ROWS: usize = 1 << 13;
-
 /// What was done for a field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -39,6 +36,7 @@ pub struct Field {
     pub counts: Counts,
     bins: Bins,
     rough: Rough,
+    desks: Vec<Desk>,
 }
 
 impl Field {
@@ -62,6 +60,7 @@ impl Field {
         if survey.count == 0 {
             *self = Self { lattice: Lattice::default(), ..std::mem::take(self) };
             self.counts = Counts::default();
+            self.desks.clear();
             self.values.clear();
             self.values.resize(self.stride() * 16, 0.0);
             return;
@@ -71,32 +70,37 @@ impl Field {
         let params = &Params { voxel, ..*params };
         self.lattice = Lattice::new((survey.low, survey.high), radius, params);
         let lattice = self.lattice;
-        let edge = rough::edge(mean, lattice.voxel);
-        let tile = if lattice.dims[1] * lattice.dims[2] >= MANY_ROWS { 2 * TILE } else { TILE };
-        self.bins.fill(particles, &lattice, (params, edge.max(tile)));
+        // Tiles that are not neighbours share no row.
+        let far = reach(radius, lattice.voxel, params) / lattice.voxel;
+        let half = far.ceil() as usize;
+        let rough_edge = rough::edge(mean, lattice.voxel);
+        let edge = (2 * half - 1).max(rough_edge).max(TILE).next_power_of_two();
+        self.bins.fill(particles, &lattice, edge);
         if params.rough {
-            let far = reach(radius, lattice.voxel, params) / lattice.voxel;
-            self.rough.fill((&self.bins, particles), &lattice, (edge, far));
+            self.rough.fill((&self.bins, particles), &lattice, (rough_edge, far));
         }
         let rough = params.rough.then_some(&self.rough);
         let source = Source::new(*particles, (&lattice, params), rough);
         let stride = self.stride();
-        self.values.resize(stride * lattice.dims[1] * lattice.dims[2], 0.0);
-        let bins = &self.bins;
-        let mut tiles = tiles(&mut self.values, stride, (bins, &lattice));
+        let Self { values, bins, desks, .. } = self;
+        values.resize(stride * lattice.dims[1] * lattice.dims[2], 0.0);
+        begin(values, stride, &source);
+        // Their memory is kept.
+        desks.resize_with(bins.tiles.count(), Desk::default);
         let masked = params.masked && particles.masks.is_some();
-        tiles.par_iter_mut().enumerate().with_max_len(1).for_each(|(number, tile)| {
-            begin(tile, &source);
-            for entries in bins.parts(number) {
+        for color in 0..4 {
+            let mut some = of_color(color, (values, desks), (bins.tiles, half), (stride, &lattice));
+            some.par_iter_mut().with_max_len(1).for_each(|(number, desk, rows)| {
+                desk.sort(bins.of(*number), (&lattice, edge), bins.tiles.first(*number));
                 dispatch!(level, simd => match (masked, params.rough) {
-                    (true, true) => fine::add::<_, true, true, COUNTED>(simd, &source, entries, tile),
-                    (true, false) => fine::add::<_, true, false, COUNTED>(simd, &source, entries, tile),
-                    (false, true) => fine::add::<_, false, true, COUNTED>(simd, &source, entries, tile),
-                    (false, false) => fine::add::<_, false, false, COUNTED>(simd, &source, entries, tile),
+                    (true, true) => fine::add::<_, true, true, COUNTED>(simd, &source, desk, rows),
+                    (true, false) => fine::add::<_, true, false, COUNTED>(simd, &source, desk, rows),
+                    (false, true) => fine::add::<_, false, true, COUNTED>(simd, &source, desk, rows),
+                    (false, false) => fine::add::<_, false, false, COUNTED>(simd, &source, desk, rows),
                 });
-            }
-        });
-        let sum = |of: fn(&Tile<'_>) -> u64| tiles.iter().map(of).sum();
+            });
+        }
+        let sum = |of: fn(&Desk) -> u64| desks.iter().map(of).sum();
         self.counts = Counts {
             particles: survey.count as u64,
             visits: sum(|t| t.visits),
@@ -106,7 +110,7 @@ impl Field {
 
     /// Numbers in a row: a vector may begin at any node.
     pub fn stride(&self) -> usize {
-        self.lattice.dims[0].next_multiple_of(LANES) + LANES
+        self.lattice.dims[0].next_multiple_of(WIDE) + WIDE
     }
 
     /// The density at a place in voxels, trilinear between nodes; 0 outside.
@@ -127,6 +131,11 @@ impl Field {
         plane(z) + (plane(z + 1) - plane(z)) * u.z
     }
 
+    /// The particles of a tile, by cell.
+    pub(crate) fn desks(&self) -> &[Desk] {
+        &self.desks
+    }
+
     /// Where the value of a node is.
     #[inline(always)]
     pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -139,34 +148,62 @@ impl Field {
     }
 }
 
-/// The rows of each tile.
-fn tiles<'a>(
-    values: &'a mut [f32],
-    stride: usize,
-    (bins, lattice): (&Bins, &Lattice),
-) -> Vec<Tile<'a>> {
-    let empty = |tile: usize| {
-        let [y, z] = bins.tiles.rows(tile, lattice).map(|rows| [rows.start, rows.len()]);
-        Tile { rows: Vec::with_capacity(y[1] * z[1]), y, z, updates: 0, visits: 0 }
-    };
-    let mut tiles: Vec<Tile<'a>> = (0..bins.tiles.count()).map(empty).collect();
-    for (number, row) in values.chunks_exact_mut(stride).enumerate() {
-        let (y, z) = (number % lattice.dims[1], number / lattice.dims[1]);
-        tiles[bins.tiles.of_row([y, z])].rows.push(row);
-    }
-    tiles
+/// Sets all to what the rough field says.
+fn begin(values: &mut [f32], stride: usize, source: &Source<'_>) {
+    let ny = source.lattice.dims[1];
+    values.par_chunks_mut(stride * ny).enumerate().for_each(|(z, plane)| {
+        plane.fill(0.0);
+        let Some(rough) = source.rough else { return };
+        for (y, row) in plane.chunks_exact_mut(stride).enumerate() {
+            rough.visit_row([y, z], |run| {
+                if let Some(voxels) = row.get_mut(run) {
+                    voxels.fill(source.params.saturation);
+                }
+            });
+        }
+    });
 }
 
-/// Sets the rows of a tile to what the rough field says.
-fn begin(tile: &mut Tile<'_>, source: &Source<'_>) {
-    for (number, row) in tile.rows.iter_mut().enumerate() {
-        row.fill(0.0);
-        let Some(rough) = source.rough else { continue };
-        let [y, z] = [tile.y[0] + number % tile.y[1], tile.z[0] + number / tile.y[1]];
-        rough.visit_row([y, z], |run| {
-            if let Some(voxels) = row.get_mut(run) {
-                voxels.fill(source.params.saturation);
-            }
-        });
+/// A tile, its particles, and the rows that they reach.
+type Work<'a> = (usize, &'a mut Desk, Rows<'a>);
+
+/// The tiles of a color, of four, and the rows less than `half` from their cells. Of two colors
+/// along each axis, tiles of one are so far apart that no row is of two.
+fn of_color<'a>(
+    color: usize,
+    (values, desks): (&'a mut [f32], &'a mut [Desk]),
+    (tiles, half): (Tiles, usize),
+    (stride, lattice): (usize, &Lattice),
+) -> Vec<Work<'a>> {
+    let own = [color % 2, color / 2];
+    let many = [0, 1].map(|a| (tiles.dims[a] + 1 - own[a]) / 2);
+    // Rows count from the first tile's first one on, which may lie before all.
+    let begin = [0, 1].map(|a| own[a] * tiles.edge);
+    let (period, high) = (2 * tiles.edge, tiles.edge + 2 * half - 1);
+    let place = |a: usize, row: usize| {
+        let from = (row + half - 1).checked_sub(begin[a])?;
+        let number = from / period;
+        (number < many[a] && from % period < high).then_some(number)
+    };
+    let mut some: Vec<Work<'a>> = Vec::with_capacity(many[0] * many[1]);
+    for (number, desk) in desks.iter_mut().enumerate() {
+        let at = [number % tiles.dims[0], number / tiles.dims[0]];
+        if (0..2).all(|a| at[a] % 2 == own[a]) {
+            let along = [0, 1].map(|a| {
+                let first = (at[a] * tiles.edge + 1).saturating_sub(half);
+                let end = (at[a] * tiles.edge + tiles.edge + half).min(lattice.dims[a + 1]);
+                [first, end.saturating_sub(first)]
+            });
+            let rows = Vec::with_capacity(along[0][1] * along[1][1]);
+            let first = along.map(|[first, _]| first);
+            some.push((number, desk, Rows { rows, first, along: along[0][1] }));
+        }
     }
+    for (number, row) in values.chunks_exact_mut(stride).enumerate() {
+        let (y, z) = (number % lattice.dims[1], number / lattice.dims[1]);
+        if let (Some(y), Some(z)) = (place(0, y), place(1, z)) {
+            some[z * many[0] + y].2.rows.push(row);
+        }
+    }
+    some
 }

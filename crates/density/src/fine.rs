@@ -6,16 +6,20 @@
 //! > R₊ₓ = R + (R_min − R)·min(P₊ₓ / P_filled, P±y / P_filled, P±z / P_filled, 1),
 //!
 //! as far as the sides around it are filled, too: else the density beside an edge would shrink along it, and the
-//! surface sink; //! q = Σ (x / R±ₓ)² takes the place of (r/R)²: an eighth of an ellipsoid in each octant. Saturated voxels
-//! are skipped. Without both this is the plain field, every particle into every voxel in its reach, by the
-//! same code.
+//! surface sink; q = Σ (x / R±ₓ)² takes the place of (r/R)²: an eighth of an ellipsoid in each octant. Saturated
+//! voxels are not changed. Without both this is the plain field, every particle into every voxel in its reach, by
+//! the same code.
+//!
+//! All particles of a cell reach the same few nodes: these are added up in registers, a block of them at a time,
+//! and then to the field. With c the cube root of the amplitude, a particle adds max(c − c·q, 0)³.
 
-use fearless_simd::{f32x8, mask32x8, prelude::*};
+use fearless_simd::{f32x4, f32x8, f32x16, prelude::*};
 use fearless_simd_macros::simd;
 use motes_grid::Radii;
 
-use crate::bins::Entry;
-use crate::kernel::amplitude;
+use crate::bins::{Entry, sort};
+use crate::kernel::height;
+use crate::lanes::LANES;
 use crate::lattice::{Lattice, reach};
 use crate::params::{Params, Particles};
 use crate::rough::Rough;
@@ -24,10 +28,10 @@ use crate::rough::Rough;
 const FILLED: f32 = 0.63;
 /// Reach towards a filled side, in voxels: with less, holes open between the voxels of particles.
 const LEAST_REACH: f32 = 1.7;
-/// Voxels in a vector.
-pub(crate) const LANES: usize = 8;
-/// Rows along a tile's edge at the most.
-pub(crate) const MOST_ROWS: usize = 64;
+/// Nodes of a block along x at the most: rows are so much longer.
+pub(crate) const WIDE: usize = 8;
+/// Nodes of a block along z at the most.
+const HIGH: usize = 8;
 
 /// What densities are made from.
 #[derive(Clone, Copy)]
@@ -36,29 +40,58 @@ pub(crate) struct Source<'a> {
     pub lattice: &'a Lattice,
     pub params: &'a Params,
     pub rough: Option<&'a Rough>,
-    /// Reach and amplitude, where all have the same.
-    uniform: Option<(f32, f32)>,
+    /// Where all have the same.
+    uniform: Option<Spread>,
 }
 
-/// A tile's rows, and where they are.
-pub(crate) struct Tile<'a> {
-    /// y fastest.
-    pub rows: Vec<&'a mut [f32]>,
-    /// First row and how many, along y and z.
-    pub y: [usize; 2],
-    pub z: [usize; 2],
+/// How the density of a particle spreads, in voxels.
+#[derive(Clone, Copy)]
+struct Spread {
+    reach: f32,
+    /// The cube root of the amplitude.
+    height: f32,
+    /// That over the square of the reach.
+    steep: f32,
+}
+
+/// A tile's particles.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Desk {
+    /// By cell, x fastest, then y.
+    entries: Vec<Entry>,
+    /// First entry of each cell, and their number.
+    starts: Vec<u32>,
+    /// Cells of entries, before they are sorted.
+    keys: Vec<u32>,
+    /// First cell, along y and z, cells along x, and along y as along z.
+    first: [usize; 2],
+    across: usize,
+    edge: usize,
+    /// Those of one cell.
+    bumps: Vec<Bump>,
     /// Voxels written.
     pub updates: u64,
-    /// Particles that were not skipped as a whole.
+    /// Particles that were not skipped.
     pub visits: u64,
 }
 
+/// The rows that particles of a tile reach, y fastest, and where they are.
+pub(crate) struct Rows<'a> {
+    pub rows: Vec<&'a mut [f32]>,
+    /// The first along y and z, and how many there are along y.
+    pub first: [usize; 2],
+    pub along: usize,
+}
+
 /// The density of one particle, in voxels.
+#[derive(Clone, Copy, Debug, Default)]
 struct Bump {
+    /// Its place in the cell.
     at: [f32; 3],
-    /// Reach to the lower and to the higher side.
-    reach: [[f32; 2]; 3],
-    amplitude: f32,
+    /// The cube root of its amplitude.
+    height: f32,
+    /// That over the square of its reach to the lower and to the higher side.
+    steep: [[f32; 2]; 3],
 }
 
 impl<'a> Source<'a> {
@@ -74,22 +107,28 @@ impl<'a> Source<'a> {
         source
     }
 
-    /// Reach and amplitude of a particle of some radius, in voxels.
+    /// That of a particle of some radius.
     #[inline(always)]
-    fn spread(&self, radius: f32) -> (f32, f32) {
+    fn spread(&self, radius: f32) -> Spread {
         let voxel = self.lattice.voxel;
-        let far = reach(radius, voxel, self.params) / voxel;
-        (far, amplitude(radius / voxel, far))
+        let reach = reach(radius, voxel, self.params) / voxel;
+        let height = height(radius / voxel, reach);
+        Spread { reach, height, steep: height / (reach * reach) }
     }
 
+    /// The density of a particle in a cell, and its greatest reach.
     #[inline(always)]
-    fn bump<const MASKED: bool>(&self, entry: &Entry) -> Bump {
+    fn bump<const MASKED: bool>(&self, entry: &Entry, cell: [f32; 3]) -> (Bump, f32) {
         let index = entry.index as usize;
-        let (far, amplitude) = match self.uniform {
+        let spread = match self.uniform {
             Some(same) => same,
             None => self.spread(self.particles.radius(index)),
         };
-        let mut bump = Bump { at: entry.at, reach: [[far; 2]; 3], amplitude };
+        let Spread { reach: far, height, steep } = spread;
+        let [x, y, z] = entry.at;
+        let at = [x - cell[0], y - cell[1], z - cell[2]];
+        let mut bump = Bump { at, height, steep: [[steep; 2]; 3] };
+        let mut greatest = far;
         if MASKED && let Some(masks) = self.particles.masks {
             let (mask, least) = (&masks[index], LEAST_REACH.min(far));
             let both = |axis: usize| mask[2 * axis].min(mask[2 * axis + 1]);
@@ -98,106 +137,238 @@ impl<'a> Source<'a> {
                 let filled = (mask[side].min(around) * (1.0 / FILLED)).clamp(0.0, 1.0);
                 far + (least - far) * filled
             };
-            bump.reach = [
+            let sides = [
                 [side(1, y.min(z)), side(0, y.min(z))],
                 [side(3, z.min(x)), side(2, z.min(x))],
                 [side(5, x.min(y)), side(4, x.min(y))],
             ];
+            bump.steep = sides.map(|sides| sides.map(|r| height / (r * r)));
+            greatest = sides.as_flattened().iter().fold(0.0, |a, b| a.max(*b));
         }
-        bump
+        (bump, greatest)
     }
 }
 
-/// Adds the densities of particles to a tile.
+impl Desk {
+    /// Takes the particles of a tile of cells, whose first rows are `first`, and sorts them by cell.
+    pub fn sort<'a>(
+        &mut self,
+        parts: impl Iterator<Item = &'a [Entry]> + Clone,
+        (lattice, edge): (&Lattice, usize),
+        first: [usize; 2],
+    ) {
+        (self.first, self.across, self.edge) = (first, lattice.dims[0], edge);
+        self.keys.clear();
+        for part in parts.clone() {
+            self.keys.extend(part.iter().map(|entry| {
+                let [x, y, z] = entry.cell();
+                (((z - first[1]) * edge + y - first[0]) * lattice.dims[0] + x) as u32
+            }));
+        }
+        self.entries.resize(self.keys.len(), Entry::default());
+        let cells = if self.keys.is_empty() { 0 } else { edge * edge * lattice.dims[0] };
+        sort(&mut self.starts, cells, (&self.keys, parts.flatten()), &mut self.entries);
+    }
+
+    /// Rows of cells; none if there are no particles.
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        (self.starts.len().saturating_sub(2)) / self.across.max(1)
+    }
+
+    /// Cells in a row.
+    #[inline(always)]
+    pub fn across(&self) -> usize {
+        self.across
+    }
+
+    /// A cell of a row, and the particles in it.
+    #[inline(always)]
+    pub fn cell(&self, row: usize, x: usize) -> ([usize; 3], &[Entry]) {
+        let at = row * self.across + x;
+        let own = self.starts[at] as usize..self.starts[at + 1] as usize;
+        let [y, z] = [self.first[0] + row % self.edge, self.first[1] + row / self.edge];
+        ([x, y, z], &self.entries[own])
+    }
+}
+
+/// Adds the densities of a tile's particles to the rows that they reach.
 #[simd]
 pub(crate) fn add<S: Simd, const MASKED: bool, const SATURATES: bool, const COUNTED: bool>(
     simd: S,
     source: &Source<'_>,
-    entries: &[Entry],
-    tile: &mut Tile<'_>,
+    desk: &mut Desk,
+    rows: &mut Rows<'_>,
 ) {
-    for entry in entries {
-        if let Some(rough) = source.rough
-            && rough.is_core(entry.at)
-        {
-            continue;
-        }
-        tile.visits += 1;
-        let bump = source.bump::<MASKED>(entry);
-        let along = whole(bump.at[0], bump.reach[0], [0, source.lattice.dims[0]]);
-        let mut first = along[0];
-        while first < along[1] {
-            add_columns::<S, MASKED, SATURATES, COUNTED>(simd, source, (&bump, first), tile);
-            first += LANES;
-        }
-    }
-}
-
-/// The whole numbers within reach of a place, but for the ends, from the first to before the last, within
-/// limits.
-#[inline(always)]
-fn whole(at: f32, reach: [f32; 2], [from, to]: [usize; 2]) -> [usize; 2] {
-    let first = (at - reach[0]).max(0.0) as usize + 1;
-    let last = (at + reach[1]).max(0.0) as usize + 1;
-    [first.max(from), last.min(to)]
-}
-
-/// Adds a density to [`LANES`] columns of a tile from `first` on.
-#[inline(always)]
-fn add_columns<S: Simd, const MASKED: bool, const SATURATES: bool, const COUNTED: bool>(
-    simd: S,
-    source: &Source<'_>,
-    (bump, first): (&Bump, usize),
-    tile: &mut Tile<'_>,
-) {
-    let saturation = f32x8::splat(simd, source.params.saturation);
-    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
-    let count = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-    let x = count + (first as f32 - bump.at[0]);
-    let [[low, high], of_y, of_z] = bump.reach.map(|sides| sides.map(|r| 1.0 / r));
-    let x = match MASKED {
-        true => x * x.simd_lt(zero).select(f32x8::splat(simd, low), f32x8::splat(simd, high)),
-        false => x * low,
-    };
-    // 1 − q of the columns; q of rows is taken from it.
-    let left = one - x * x;
-    let ys = whole(bump.at[1], bump.reach[1], [tile.y[0], tile.y[0] + tile.y[1]]);
-    let zs = whole(bump.at[2], bump.reach[2], [tile.z[0], tile.z[0] + tile.z[1]]);
-    if ys[0] >= ys[1] {
-        return;
-    }
-    let mut parts = [0.0; MOST_ROWS];
-    for y in ys[0]..ys[1] {
-        parts[y - ys[0]] = part(y, bump.at[1], of_y);
-    }
-    for z in zs[0]..zs[1] {
-        let qz = part(z, bump.at[2], of_z);
-        let begin = (z - tile.z[0]) * tile.y[1] + ys[0] - tile.y[0];
-        let rows = &mut tile.rows[begin..begin + ys[1] - ys[0]];
-        for (row, qy) in rows.iter_mut().zip(&parts) {
-            // Rows that are hardly met are not worth a test.
-            let w = (left - (qz + qy)).max(zero);
-            let more = w * w * (w * bump.amplitude);
-            let Some(voxels) = row.get_mut(first..first + LANES) else { continue };
-            let before = f32x8::from_slice(simd, voxels);
-            let after = match SATURATES {
-                true => (before + more).min(saturation).max(before),
-                false => before + more,
+    let mut bumps = std::mem::take(&mut desk.bumps);
+    let (mut visits, mut updates) = (0, 0);
+    for row in 0..desk.rows() {
+        for x in 0..desk.across {
+            let (cell, own) = desk.cell(row, x);
+            if own.is_empty() || source.rough.is_some_and(|rough| rough.is_core(cell)) {
+                continue;
+            }
+            visits += own.len() as u64;
+            let corner = cell.map(|c| c as f32);
+            let mut far = 0.0_f32;
+            bumps.clear();
+            for entry in own {
+                let (bump, reach) = source.bump::<MASKED>(entry, corner);
+                bumps.push(bump);
+                far = far.max(reach);
+            }
+            let made = (&bumps[..], cell);
+            let near = (far.ceil() as usize, source.params.saturation);
+            updates += match near.0 {
+                ..=2 => in_blocks::<S, 4, 4, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
+                3 => in_blocks::<S, 8, 6, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
+                _ => in_blocks::<S, 8, 8, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
             };
-            after.store_slice(voxels);
-            if COUNTED {
-                let open = if SATURATES { before.simd_lt(saturation) } else { one.simd_gt(zero) };
-                let written: mask32x8<S> = open & w.simd_gt(zero);
-                tile.updates += u64::from(written.to_bitmask().count_ones());
+        }
+    }
+    (desk.bumps, desk.visits, desk.updates) = (bumps, visits, updates);
+}
+
+/// Adds the densities of a cell's particles, block by block, to all nodes less than `half` from it; how many are
+/// written, if counted.
+#[inline(always)]
+fn in_blocks<
+    S: Simd,
+    const X: usize,
+    const Z: usize,
+    const MASKED: bool,
+    const SATURATES: bool,
+    const COUNTED: bool,
+>(
+    simd: S,
+    (bumps, cell): (&[Bump], [usize; 3]),
+    (half, limit): (usize, f32),
+    rows: &mut Rows<'_>,
+) -> u64 {
+    let (first, nodes, mut written) = (1 - half as i32, 2 * half, 0);
+    let begin = [cell[0], cell[1] - rows.first[0], cell[2] - rows.first[1]];
+    for z in (0..nodes).step_by(Z) {
+        for y in (0..nodes).step_by(LANES / X) {
+            for x in (0..nodes).step_by(X) {
+                let from = [x, y, z].map(|v| first + v as i32);
+                let at = [0, 1, 2].map(|a| begin[a].wrapping_add_signed(from[a] as isize));
+                let mut open = [0xffff; Z];
+                if COUNTED && SATURATES {
+                    open = rows.below::<X, Z>(at, limit);
+                }
+                let (sums, some) = sum::<S, X, Z, MASKED, COUNTED>(simd, bumps, (from, open));
+                written += some;
+                for k in 0..Z.min(nodes - z) {
+                    let at = [at[0], at[1], at[2] + k];
+                    rows.add::<S, X, SATURATES>(simd, at, (sums[k], limit));
+                }
             }
         }
     }
+    written
 }
 
-/// The part of q that one axis makes, of which one over the reach to each side is known.
+/// What particles add to the nodes of a block: X along x, so many along y that they are a vector, Z along z;
+/// and how many of those in `open` are written, one after the other, if counted.
 #[inline(always)]
-fn part(voxel: usize, at: f32, per_reach: [f32; 2]) -> f32 {
-    let d = voxel as f32 - at;
-    let d = d * if d < 0.0 { per_reach[0] } else { per_reach[1] };
-    d * d
+fn sum<S: Simd, const X: usize, const Z: usize, const MASKED: bool, const COUNTED: bool>(
+    simd: S,
+    bumps: &[Bump],
+    (from, open): ([i32; 3], [u64; Z]),
+) -> ([f32x16<S>; Z], u64) {
+    let count = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+    let mut places = [[0.0; LANES]; 2];
+    for i in 0..LANES {
+        places[0][i] = (from[0] + (count[i] % X) as i32) as f32;
+        places[1][i] = (from[1] + (count[i] / X) as i32) as f32;
+    }
+    let zero = f32x16::splat(simd, 0.0);
+    let x = f32x16::from_slice(simd, &places[0]);
+    let y = f32x16::from_slice(simd, &places[1]);
+    let z = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + from[2] as f32;
+    let (mut sums, mut written) = ([zero; Z], 0);
+    for bump in bumps {
+        let (dx, dy, dz) = (x - bump.at[0], y - bump.at[1], z - bump.at[2]);
+        let (across, down) = match MASKED {
+            true => {
+                let side = |of: [f32; 2], from: f32x16<S>| {
+                    let [low, high] = of.map(|steep| f32x16::splat(simd, steep));
+                    from.simd_le(zero).select(low, high)
+                };
+                let [low, high] = bump.steep[2].map(|steep| f32x8::splat(simd, steep));
+                let down = z.simd_le(f32x8::splat(simd, 0.0)).select(low, high);
+                let along = dx * dx * side(bump.steep[0], x) + dy * dy * side(bump.steep[1], y);
+                (along, dz * dz * down)
+            }
+            false => ((dx * dx + dy * dy) * bump.steep[0][0], dz * dz * bump.steep[0][0]),
+        };
+        let left = f32x16::splat(simd, bump.height) - across;
+        let mut downs = [0.0; HIGH];
+        down.store_slice(&mut downs);
+        for k in 0..Z {
+            let w = (left - downs[k]).max(zero);
+            sums[k] += w * w * w;
+            if COUNTED {
+                written += u64::from((w.simd_gt(zero).to_bitmask() & open[k]).count_ones());
+            }
+        }
+    }
+    (sums, written)
+}
+
+impl Rows<'_> {
+    /// The numbers of a row from a node on; none if it has not so many.
+    #[inline(always)]
+    fn part<const X: usize>(&mut self, [x, y, z]: [usize; 3]) -> Option<&mut [f32; X]> {
+        let row = self.rows.get_mut(z * self.along + y)?;
+        row.get_mut(x..x + X)?.first_chunk_mut()
+    }
+
+    /// Adds to the nodes of a layer of a block, up to a limit if it `SATURATES`.
+    #[inline(always)]
+    fn add<S: Simd, const X: usize, const SATURATES: bool>(
+        &mut self,
+        simd: S,
+        [x, y, z]: [usize; 3],
+        (more, limit): (f32x16<S>, f32),
+    ) {
+        let most = f32x8::splat(simd, limit);
+        let (one, other) = more.split();
+        for (half, more) in [one, other].into_iter().enumerate() {
+            if X == WIDE {
+                let Some(part) = self.part::<WIDE>([x, y + half, z]) else { continue };
+                let before = f32x8::from_slice(simd, part);
+                let after = before + more;
+                let after = if SATURATES { after.min(most).max(before) } else { after };
+                after.store_slice(part);
+            } else {
+                let (one, other) = more.split();
+                let (most, _) = most.split();
+                for (quarter, more) in [one, other].into_iter().enumerate() {
+                    let at = [x, y + 2 * half + quarter, z];
+                    let Some(part) = self.part::<4>(at) else { continue };
+                    let before = f32x4::from_slice(simd, part);
+                    let after = before + more;
+                    let after = if SATURATES { after.min(most).max(before) } else { after };
+                    after.store_slice(part);
+                }
+            }
+        }
+    }
+
+    /// Which nodes of a block are below a limit.
+    fn below<const X: usize, const Z: usize>(
+        &mut self,
+        [x, y, z]: [usize; 3],
+        limit: f32,
+    ) -> [u64; Z] {
+        let mut open = [0; Z];
+        for k in 0..Z {
+            for i in 0..LANES {
+                let part = self.part::<1>([x + i % X, y + i / X, z + k]);
+                open[k] |= u64::from(part.is_some_and(|v| v[0] < limit)) << i;
+            }
+        }
+        open
+    }
 }

@@ -4,16 +4,13 @@
 //! "poly6"; Yasuda et al. 2009 leave the shape open). A particle of radius ρ stands for a cube of edge 2ρ:
 //! V = (2ρ)³ W is what it adds, and a liquid at rest has a density of about 1, whatever the unit of length.
 
-use std::f64::consts::PI;
+/// The cube root of 8·315 / (64 π).
+const HEIGHT: f32 = 2.322_862_8;
 
-/// 8·315 / (64 π).
-const AMPLITUDE: f32 = (8.0 * 315.0 / (64.0 * PI)) as f32;
-
-/// V·A for a particle of radius `radius` whose density reaches `reach`, in one unit.
+/// The cube root of V·A for a particle of radius `radius` whose density reaches `reach`, in one unit.
 #[inline(always)]
-pub(crate) fn amplitude(radius: f32, reach: f32) -> f32 {
-    let ratio = radius / reach;
-    AMPLITUDE * (ratio * ratio * ratio)
+pub(crate) fn height(radius: f32, reach: f32) -> f32 {
+    HEIGHT * (radius / reach)
 }
 
 /// (1 − q)³ for q = r²/R² in 0 to 1, else 0.
@@ -23,6 +20,8 @@ pub(crate) fn shape(q: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]
@@ -34,7 +33,7 @@ mod tests {
             4.0 * PI * r * r * shape(r * r / (reach * reach)) * step
         };
         let integral: f64 = (0..4000).map(shell).sum();
-        let volume = integral * f64::from(amplitude(radius, reach as f32));
+        let volume = integral * f64::from(height(radius, reach as f32)).powi(3);
         assert!((volume - 0.5_f64.powi(3)).abs() < 1e-5, "{volume}");
     }
 }

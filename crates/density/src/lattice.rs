@@ -64,7 +64,7 @@ impl Lattice {
     /// A place in voxels.
     #[inline]
     pub fn place(&self, point: Vec3) -> Vec3 {
-        (point - self.low) / self.voxel
+        (point - self.low) * (1.0 / self.voxel)
     }
 
     /// The point at a place.

@@ -11,7 +11,6 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::bins::Bins;
-use crate::fine::MOST_ROWS;
 use crate::lattice::Lattice;
 use crate::params::Particles;
 
@@ -19,6 +18,8 @@ use crate::params::Particles;
 /// as many particles as fit, it is 0.5.
 const FULL: f32 = 0.4;
 
+/// Voxels along a cell's edge at the most.
+const MOST_WIDE: f32 = 64.0;
 /// Planes of cells that are worth a thread.
 const MIN_PLANES: usize = 32;
 /// Voxels at the rim of what is saturated that are not: the surface may go through a full cell.
@@ -43,7 +44,7 @@ pub(crate) struct Rough {
 /// Voxels along the edge of a cell that is about two particles wide.
 pub(crate) fn edge(radius: f32, voxel: f32) -> usize {
     // A hair less, as the default voxel is exactly half a cell.
-    let wide = (4.0 * radius / voxel * 0.999).ceil().clamp(1.0, MOST_ROWS as f32);
+    let wide = (4.0 * radius / voxel * 0.999).ceil().clamp(1.0, MOST_WIDE);
     (wide as usize).next_power_of_two()
 }
 
@@ -74,27 +75,17 @@ impl Rough {
     /// Adds up volumes, each tile those of its own particles.
     fn sum(&mut self, bins: &Bins, particles: &Particles<'_>, lattice: &Lattice) {
         let (rows, [along, ..]) = (self.rows(bins), self.dims);
-        let (per_cell, last) = (1.0 / self.edge as f32, along - 1);
+        let shift = self.edge.trailing_zeros();
         self.volumes.clear();
         self.volumes.resize(bins.tiles.count() * rows * rows * along, 0.0);
         let of_tiles = self.volumes.par_chunks_mut(rows * rows * along);
         of_tiles.enumerate().for_each(|(tile, volumes)| {
-            let [ys, zs] = bins.tiles.rows(tile, lattice);
-            for entry in bins.of(tile) {
-                let [x, y, z] = entry.at;
-                let own = y >= ys.start as f32
-                    && y < (ys.start + bins.tiles.edge) as f32
-                    && z >= zs.start as f32
-                    && z < (zs.start + bins.tiles.edge) as f32;
-                if own {
-                    let in_tile = |v: f32, from: usize| {
-                        (((v - from as f32) * per_cell) as usize).min(rows - 1)
-                    };
-                    let row = in_tile(z, zs.start) * rows + in_tile(y, ys.start);
-                    let cell = ((x * per_cell) as usize).min(last);
-                    let width = 2.0 * particles.radius(entry.index as usize) / lattice.voxel;
-                    volumes[row * along + cell] += width * width * width;
-                }
+            let [first_y, first_z] = bins.tiles.first(tile);
+            for entry in bins.of(tile).flatten() {
+                let [x, y, z] = entry.cell();
+                let row = ((z - first_z) >> shift) * rows + ((y - first_y) >> shift);
+                let width = 2.0 * particles.radius(entry.index as usize) / lattice.voxel;
+                volumes[row * along + (x >> shift)] += width * width * width;
             }
         });
     }
@@ -180,12 +171,11 @@ impl Rough {
         }
     }
 
-    /// Whether all that a particle at a place reaches is saturated.
+    /// Whether all that particles in a cell of the field reach is saturated.
     #[inline(always)]
-    pub fn is_core(&self, at: [f32; 3]) -> bool {
+    pub fn is_core(&self, cell: [usize; 3]) -> bool {
         let [nx, ny, nz] = self.dims;
-        let shift = self.edge.trailing_zeros();
-        let [x, y, z] = at.map(|v| v as usize >> shift);
+        let [x, y, z] = cell.map(|v| v >> self.edge.trailing_zeros());
         let inside = x < nx && y < ny && z < nz;
         inside && self.core[(z * ny + y) * nx + x] != 0
     }
