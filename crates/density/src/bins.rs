@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use motes_grid::Radii;
 use rayon::prelude::*;
 
 use crate::lattice::Lattice;
@@ -26,14 +27,6 @@ pub(crate) struct Entry {
     pub at: [f32; 3],
     /// Its place in the input.
     pub index: u32,
-}
-
-impl Entry {
-    /// The cell that it is in.
-    #[inline(always)]
-    pub fn cell(&self) -> [usize; 3] {
-        self.at.map(|v| v as u32 as usize)
-    }
 }
 
 /// Where tiles lie: along y and z.
@@ -69,12 +62,23 @@ pub(crate) struct Bins {
 
 #[derive(Clone, Debug, Default)]
 struct Chunk {
-    /// First entry of each tile, and their number.
-    starts: Vec<u32>,
+    /// Its particles, and the cells of their tiles that they are in.
     entries: Vec<Entry>,
-    /// Its particles, and their tiles, before they are sorted.
-    found: Vec<Entry>,
-    tiles: Vec<u32>,
+    cells: Vec<u32>,
+    /// Those that follow each other in a tile, by tile.
+    runs: Vec<Run>,
+    /// The first run of each tile, and their number.
+    starts: Vec<u32>,
+    /// The runs before they are sorted.
+    found: Vec<Run>,
+}
+
+/// Particles of a chunk, one after the other, that are in the same tile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Run {
+    tile: u32,
+    begin: u32,
+    end: u32,
 }
 
 /// What is known of particles before there is a lattice.
@@ -103,16 +107,15 @@ impl Survey {
         let parts: Vec<Self> = chunks
             .map(|(chunk, positions)| {
                 let mut part = Self::NONE;
+                if let Radii::Uniform(radius) = particles.radii {
+                    positions.iter().for_each(|p| part.add((*p).into(), radius));
+                    return Self { radii: part.count as f64 * f64::from(radius), ..part };
+                }
                 for (i, position) in positions.iter().enumerate() {
                     let radius = particles.radius(chunk * SURVEYED + i);
-                    let point = Vec3::from_array(*position);
-                    if drawable(point, radius) {
-                        part.low = part.low.min(point);
-                        part.high = part.high.max(point);
-                        part.greatest_radius = part.greatest_radius.max(radius);
-                        part.radii += f64::from(radius);
-                        part.count += 1;
-                    }
+                    let before = part.count;
+                    part.add((*position).into(), radius);
+                    part.radii += (part.count - before) as f64 * f64::from(radius);
                 }
                 part
             })
@@ -124,6 +127,17 @@ impl Survey {
             radii: a.radii + b.radii,
             count: a.count + b.count,
         })
+    }
+
+    /// Takes one more, but for the sum of radii.
+    #[inline(always)]
+    fn add(&mut self, point: Vec3, radius: f32) {
+        if drawable(point, radius) {
+            self.low = self.low.min(point);
+            self.high = self.high.max(point);
+            self.greatest_radius = self.greatest_radius.max(radius);
+            self.count += 1;
+        }
     }
 }
 
@@ -144,15 +158,19 @@ impl Bins {
         });
     }
 
-    /// The particles of a tile, chunk by chunk.
-    pub fn of(&self, tile: usize) -> impl Iterator<Item = &[Entry]> + Clone {
-        self.chunks.iter().map(move |chunk| chunk.of(tile)).filter(|entries| !entries.is_empty())
+    /// The particles of a tile, and their cells, in the order of the input.
+    pub fn of(&self, tile: usize) -> impl Iterator<Item = (&[Entry], &[u32])> + Clone {
+        self.chunks.iter().flat_map(move |chunk| chunk.of(tile))
     }
 }
 
 impl Chunk {
-    fn of(&self, tile: usize) -> &[Entry] {
-        &self.entries[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    fn of(&self, tile: usize) -> impl Iterator<Item = (&[Entry], &[u32])> + Clone {
+        let runs = &self.runs[self.starts[tile] as usize..self.starts[tile + 1] as usize];
+        runs.iter().map(|run| {
+            let run = run.begin as usize..run.end as usize;
+            (&self.entries[run.clone()], &self.cells[run])
+        })
     }
 
     /// Finds where the particles of a range are.
@@ -163,49 +181,63 @@ impl Chunk {
         lattice: &Lattice,
         tiles: Tiles,
     ) {
-        self.found.clear();
-        self.tiles.clear();
+        let Self { entries, cells, found, .. } = self;
+        entries.clear();
+        cells.clear();
+        found.clear();
         let (shift, row) = (tiles.edge.trailing_zeros(), tiles.dims[0] as u32);
+        let (within, across) = (tiles.edge as u32 - 1, lattice.dims[0] as u32);
         // They are inside, but for what coordinates far from 0 are rounded by.
         let last = Vec3::from_array(lattice.cells().map(|n| (n - 1) as f32));
+        let mut run = Run::default();
         for index in range {
             let point = Vec3::from_array(particles.positions[index]);
-            if drawable(point, particles.radius(index)) {
-                let at = lattice.place(point).max(Vec3::ZERO).min(last);
-                self.found.push(Entry { at: at.to_array(), index: index as u32 });
-                self.tiles.push((at.z as u32 >> shift) * row + (at.y as u32 >> shift));
+            if !drawable(point, particles.radius(index)) {
+                continue;
             }
+            let at = lattice.place(point).max(Vec3::ZERO).min(last).to_array();
+            let [x, y, z] = at.map(|v| v as i32 as u32);
+            let tile = (z >> shift) * row + (y >> shift);
+            if tile != run.tile {
+                found.push(run);
+                run = Run { tile, begin: run.end, end: run.end };
+            }
+            run.end += 1;
+            entries.push(Entry { at, index: index as u32 });
+            cells.push((((z & within) << shift) + (y & within)) * across + x);
         }
+        found.push(run);
     }
 
     /// Sorts them by tile.
     fn sort(&mut self, tiles: Tiles) {
-        self.entries.resize(self.found.len(), Entry::default());
-        let Self { starts, entries, found, tiles: of, .. } = self;
-        sort(starts, tiles.count(), (of, found.iter()), entries);
+        let Self { starts, runs, found, .. } = self;
+        runs.resize(found.len(), Run::default());
+        let of = found.iter().map(|run| run.tile);
+        sort(starts, tiles.count(), of.zip(found.iter().copied()), runs);
     }
 }
 
-/// Sorts entries by key, stably; leaves where each key's begin, and their number.
+/// Sorts what has a key each by it, stably; leaves where each key's begin, and their number.
 #[inline(always)]
-pub(crate) fn sort<'a>(
+pub(crate) fn sort<T: Copy>(
     starts: &mut Vec<u32>,
     keys: usize,
-    (of, from): (&[u32], impl Iterator<Item = &'a Entry>),
-    to: &mut [Entry],
+    from: impl Iterator<Item = (u32, T)> + Clone,
+    to: &mut [T],
 ) {
     starts.clear();
     starts.resize(keys + 2, 0);
-    for key in of {
-        starts[*key as usize + 2] += 1;
+    for (key, _) in from.clone() {
+        starts[key as usize + 2] += 1;
     }
     for key in 0..keys {
         starts[key + 2] += starts[key + 1];
     }
-    // Each start moves on to the next key's as its entries come.
-    for (entry, key) in from.zip(of) {
-        let next = &mut starts[*key as usize + 1];
-        to[*next as usize] = *entry;
+    // Each start moves on to the next key's as its own come.
+    for (key, one) in from {
+        let next = &mut starts[key as usize + 1];
+        to[*next as usize] = one;
         *next += 1;
     }
 }

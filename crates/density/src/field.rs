@@ -76,8 +76,14 @@ impl Field {
         let rough_edge = rough::edge(mean, lattice.voxel);
         let edge = (2 * half - 1).max(rough_edge).max(TILE).next_power_of_two();
         self.bins.fill(particles, &lattice, edge);
+        let Self { bins, desks, .. } = self;
+        // Their memory is kept.
+        desks.resize_with(bins.tiles.count(), Desk::default);
+        desks.par_iter_mut().enumerate().with_max_len(1).for_each(|(tile, desk)| {
+            desk.sort(bins.of(tile), (&lattice, edge), bins.tiles.first(tile));
+        });
         if params.rough {
-            self.rough.fill((&self.bins, particles), &lattice, (rough_edge, far));
+            self.rough.fill((desks, bins.tiles, particles), &lattice, (rough_edge, far));
         }
         let rough = params.rough.then_some(&self.rough);
         let source = Source::new(*particles, (&lattice, params), rough);
@@ -85,13 +91,10 @@ impl Field {
         let Self { values, bins, desks, .. } = self;
         values.resize(stride * lattice.dims[1] * lattice.dims[2], 0.0);
         begin(values, stride, &source);
-        // Their memory is kept.
-        desks.resize_with(bins.tiles.count(), Desk::default);
         let masked = params.masked && particles.masks.is_some();
         for color in 0..4 {
             let mut some = of_color(color, (values, desks), (bins.tiles, half), (stride, &lattice));
-            some.par_iter_mut().with_max_len(1).for_each(|(number, desk, rows)| {
-                desk.sort(bins.of(*number), (&lattice, edge), bins.tiles.first(*number));
+            some.par_iter_mut().with_max_len(1).for_each(|(desk, rows)| {
                 dispatch!(level, simd => match (masked, params.rough) {
                     (true, true) => fine::add::<_, true, true, COUNTED>(simd, &source, desk, rows),
                     (true, false) => fine::add::<_, true, false, COUNTED>(simd, &source, desk, rows),
@@ -164,8 +167,8 @@ fn begin(values: &mut [f32], stride: usize, source: &Source<'_>) {
     });
 }
 
-/// A tile, its particles, and the rows that they reach.
-type Work<'a> = (usize, &'a mut Desk, Rows<'a>);
+/// A tile's particles, and the rows that they reach.
+type Work<'a> = (&'a mut Desk, Rows<'a>);
 
 /// The tiles of a color, of four, and the rows less than `half` from their cells. Of two colors
 /// along each axis, tiles of one are so far apart that no row is of two.
@@ -196,13 +199,13 @@ fn of_color<'a>(
             });
             let rows = Vec::with_capacity(along[0][1] * along[1][1]);
             let first = along.map(|[first, _]| first);
-            some.push((number, desk, Rows { rows, first, along: along[0][1] }));
+            some.push((desk, Rows { rows, first, along: along[0][1] }));
         }
     }
     for (number, row) in values.chunks_exact_mut(stride).enumerate() {
         let (y, z) = (number % lattice.dims[1], number / lattice.dims[1]);
         if let (Some(y), Some(z)) = (place(0, y), place(1, z)) {
-            some[z * many[0] + y].2.rows.push(row);
+            some[z * many[0] + y].1.rows.push(row);
         }
     }
     some

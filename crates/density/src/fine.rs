@@ -61,7 +61,8 @@ pub(crate) struct Desk {
     entries: Vec<Entry>,
     /// First entry of each cell, and their number.
     starts: Vec<u32>,
-    /// Cells of entries, before they are sorted.
+    /// Entries and their cells, before they are sorted.
+    unsorted: Vec<Entry>,
     keys: Vec<u32>,
     /// First cell, along y and z, cells along x, and along y as along z.
     first: [usize; 2],
@@ -150,24 +151,26 @@ impl<'a> Source<'a> {
 }
 
 impl Desk {
-    /// Takes the particles of a tile of cells, whose first rows are `first`, and sorts them by cell.
+    /// Takes the particles of a tile, and the cells that they are in, whose first rows are `first`, and sorts
+    /// them.
     pub fn sort<'a>(
         &mut self,
-        parts: impl Iterator<Item = &'a [Entry]> + Clone,
+        parts: impl Iterator<Item = (&'a [Entry], &'a [u32])> + Clone,
         (lattice, edge): (&Lattice, usize),
         first: [usize; 2],
     ) {
         (self.first, self.across, self.edge) = (first, lattice.dims[0], edge);
-        self.keys.clear();
-        for part in parts.clone() {
-            self.keys.extend(part.iter().map(|entry| {
-                let [x, y, z] = entry.cell();
-                (((z - first[1]) * edge + y - first[0]) * lattice.dims[0] + x) as u32
-            }));
+        let (entries, unsorted, cells) = (&mut self.entries, &mut self.unsorted, &mut self.keys);
+        unsorted.clear();
+        cells.clear();
+        for (some, own) in parts {
+            unsorted.extend_from_slice(some);
+            cells.extend_from_slice(own);
         }
-        self.entries.resize(self.keys.len(), Entry::default());
-        let cells = if self.keys.is_empty() { 0 } else { edge * edge * lattice.dims[0] };
-        sort(&mut self.starts, cells, (&self.keys, parts.flatten()), &mut self.entries);
+        entries.resize(cells.len(), Entry::default());
+        let count = if cells.is_empty() { 0 } else { edge * edge * lattice.dims[0] };
+        let from = cells.iter().copied().zip(unsorted.iter().copied());
+        sort(&mut self.starts, count, from, entries);
     }
 
     /// Rows of cells; none if there are no particles.

@@ -17,15 +17,17 @@ use crate::space::{DROPS, SURFACE, Space};
 /// How far a ray goes beyond a cell it leaves, in voxels.
 const BEYOND: f32 = 5e-4;
 /// Idle lanes that are worth being given rays.
-const IDLE: u32 = 4;
+const IDLE: u32 = 2;
 /// Lanes that are worth looking for crossings.
-const LOOKING: u32 = 6;
+const LOOKING: u32 = 8;
 /// Drops that overlap, one behind the other, at the most.
 const CHAIN: usize = 64;
 
+const COUNT: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
 /// Sixteen rays on their way.
 struct Walk {
-    ray: [u32; LANES],
+    ray: Lanes<u32>,
     origin: [Lanes<f32>; 3],
     direction: [Lanes<f32>; 3],
     inverse: [Lanes<f32>; 3],
@@ -65,6 +67,7 @@ pub(crate) fn march<S: Simd>(
 ) {
     hits.clear(rays.len());
     rays.clip(simd, space.bounds);
+    leave_drops((field, space), rays, hits);
     // Two in turns: one goes on while the other waits for memory.
     let (mut one, mut other) = (Walk::new(), Walk::new());
     let mut next = 0;
@@ -73,12 +76,17 @@ pub(crate) fn march<S: Simd>(
     {}
 }
 
+#[inline(always)]
+fn load<S: Simd>(simd: S, lanes: &Lanes<f32>) -> f32x16<S> {
+    f32x16::from_slice(simd, &lanes.0)
+}
+
 impl Walk {
     fn new() -> Self {
         let zero = Lanes([0.0; LANES]);
         let one = Lanes([1.0; LANES]);
         Self {
-            ray: [0; LANES],
+            ray: Lanes([0; LANES]),
             origin: [zero; 3],
             direction: [one; 3],
             inverse: [one; 3],
@@ -100,7 +108,7 @@ impl Walk {
         hits: &mut Hits,
     ) -> bool {
         if LANES as u32 - self.alive.count_ones() >= IDLE {
-            self.refill(within, (rays, next), hits);
+            self.refill(simd, rays, next);
         }
         if self.alive == 0 {
             return false;
@@ -111,54 +119,50 @@ impl Walk {
 
     /// Gives the next rays to idle lanes.
     #[inline(always)]
-    fn refill(
-        &mut self,
-        (field, space): (&Field, &Space),
-        (rays, next): (&Rays, &mut usize),
-        hits: &mut Hits,
-    ) {
-        let mut idle = !self.alive & 0xffff;
-        while idle != 0 && *next < rays.len() {
-            let ray = *next;
-            *next += 1;
-            let (mut from, medium) = (rays.from[ray], rays.medium[ray]);
-            if medium < LIQUID {
-                match leave((field, space), (rays.origin(ray), rays.direction(ray)), medium) {
-                    Left::Out(t, drop) => {
-                        (hits.distance[ray], hits.surface[ray]) = (t, drop);
-                        continue;
-                    }
-                    Left::Into(t) => from = t,
-                }
-            }
-            if from >= rays.to[ray] {
-                continue;
-            }
-            let lane = idle.trailing_zeros() as usize;
+    fn refill<S: Simd>(&mut self, simd: S, rays: &Rays, next: &mut usize) {
+        let (mut idle, first) = (!self.alive & 0xffff, *next);
+        let left = rays.len() - first;
+        while idle.count_ones() as usize > left {
             idle &= idle - 1;
-            let bit = 1 << lane;
-            for a in 0..3 {
-                self.origin[a].0[lane] = rays.origin[a][ray];
-                self.direction[a].0[lane] = rays.direction[a][ray];
-                self.inverse[a].0[lane] = rays.inverse[a][ray];
-            }
-            (self.t.0[lane], self.to.0[lane]) = (from, rays.to[ray]);
-            self.ray[lane] = ray as u32;
-            self.alive |= bit;
-            self.fresh |= bit;
-            self.inside = if medium == OUTSIDE { self.inside & !bit } else { self.inside | bit };
         }
+        if idle == 0 {
+            return;
+        }
+        *next += idle.count_ones() as usize;
+        let mask = mask32x16::from_bitmask(simd, u64::from(idle));
+        let give = |row: &[f32], lanes: &mut Lanes<f32>| {
+            let more = f32x16::from_slice(simd, &row[first..first + LANES]);
+            let own = f32x16::from_slice(simd, &lanes.0);
+            more.expand_merge(mask, own).store_slice(&mut lanes.0);
+        };
+        for a in 0..3 {
+            give(&rays.origin[a], &mut self.origin[a]);
+            give(&rays.direction[a], &mut self.direction[a]);
+            give(&rays.inverse[a], &mut self.inverse[a]);
+        }
+        give(&rays.from, &mut self.t);
+        give(&rays.to, &mut self.to);
+        let numbers = u32x16::from_slice(simd, &COUNT) + first as u32;
+        let own = u32x16::from_slice(simd, &self.ray.0);
+        numbers.expand_merge(mask, own).store_slice(&mut self.ray.0);
+        let media = u32x16::from_slice(simd, &rays.medium[first..first + LANES]).expand(mask);
+        let outside = media.simd_eq(u32x16::splat(simd, OUTSIDE)).to_bitmask() as u32;
+        let (t, to) = (load(simd, &self.t), load(simd, &self.to));
+        let some = t.simd_lt(to).to_bitmask() as u32;
+        self.inside = (self.inside & !idle) | (idle & !outside);
+        self.alive |= idle & some;
+        self.fresh |= idle;
     }
 
     /// Lets each lane jump, or look for a crossing.
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, (field, space): (&Field, &Space), hits: &mut Hits) {
-        let t = f32x16::from_slice(simd, &self.t.0);
+        let t = load(simd, &self.t);
         let (mut place, mut cell) = ([t; 3], [t; 3]);
         let zero = f32x16::splat(simd, 0.0);
         for a in 0..3 {
-            let o = f32x16::from_slice(simd, &self.origin[a].0);
-            let d = f32x16::from_slice(simd, &self.direction[a].0);
+            let o = load(simd, &self.origin[a]);
+            let d = load(simd, &self.direction[a]);
             place[a] = d.mul_add(t, o);
             // The box of all surfaces lies within the cells.
             cell[a] = place[a].floor().max(zero);
@@ -182,8 +186,8 @@ impl Walk {
         let jump: f32x16<S> = looking.select(one, jumps.to_float());
         let mut end = f32x16::splat(simd, f32::INFINITY);
         for a in 0..3 {
-            let o = f32x16::from_slice(simd, &self.origin[a].0);
-            let inverse = f32x16::from_slice(simd, &self.inverse[a].0);
+            let o = load(simd, &self.origin[a]);
+            let inverse = load(simd, &self.inverse[a]);
             let bound = inverse.simd_ge(zero).select(cell[a] + jump, cell[a] - jump + one);
             end = end.min((bound - o) * inverse);
         }
@@ -199,14 +203,14 @@ impl Walk {
             moved |= look;
         }
         let on = mask32x16::from_bitmask(simd, u64::from(moved));
-        let to = f32x16::from_slice(simd, &self.to.0);
+        let to = load(simd, &self.to);
         on.select((end + BEYOND).min(to), t).store_slice(&mut self.t.0);
         self.fresh &= !moved;
         if looks {
             self.settle((field, space), &here, (met, drops), hits);
         }
-        let t = f32x16::from_slice(simd, &self.t.0);
-        let gone = t.simd_ge(f32x16::from_slice(simd, &self.to.0)).to_bitmask() as u32;
+        let t = load(simd, &self.t);
+        let gone = t.simd_ge(load(simd, &self.to)).to_bitmask() as u32;
         self.alive &= !gone;
     }
 
@@ -224,30 +228,30 @@ impl Walk {
         let stride = field.stride();
         let row = at[2] * u32x16::splat(simd, ny as u32) + at[1];
         let index = row * u32x16::splat(simd, stride as u32) + at[0];
+        let offsets = [0, stride, stride * ny, stride * (ny + 1)];
+        let span = offsets[3] + 2;
+        // Of lanes that do not look, too: it is quicker not to ask.
+        let last = u32x16::splat(simd, field.values.len().saturating_sub(span) as u32);
         let mut indices = Lanes([0_u32; LANES]);
-        index.store_slice(&mut indices.0);
+        index.min(last).store_slice(&mut indices.0);
         // Pairs along x.
-        let mut pairs = [[Lanes([0.0; LANES]); 2]; 4];
-        let mut left = look;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let first = indices.0[lane] as usize;
-            let rows = [first, first + stride, first + stride * ny, first + stride * (ny + 1)];
-            for (k, row) in rows.into_iter().enumerate() {
-                let to = &mut pairs[k][lane / 8].0[lane % 8 * 2..][..2];
-                to.copy_from_slice(&field.values[row..row + 2]);
+        let mut pairs = [Lanes([[0.0; 2]; LANES]); 4];
+        for lane in 0..LANES {
+            let near = &field.values[indices.0[lane] as usize..][..span];
+            for k in 0..4 {
+                pairs[k].0[lane] = [near[offsets[k]], near[offsets[k] + 1]];
             }
         }
         let mut values = [t; 8];
         for k in 0..4 {
-            let low = f32x16::from_slice(simd, &pairs[k][0].0) - threshold;
-            let high = f32x16::from_slice(simd, &pairs[k][1].0) - threshold;
+            let (low, high) = pairs[k].0.as_flattened().split_at(LANES);
+            let low = f32x16::from_slice(simd, low) - threshold;
+            let high = f32x16::from_slice(simd, high) - threshold;
             (values[2 * k], values[2 * k + 1]) = low.deinterleave(high);
         }
         let mut way = [t; 3];
         for a in 0..3 {
-            way[a] = f32x16::from_slice(simd, &self.direction[a].0) * (end - t);
+            way[a] = load(simd, &self.direction[a]) * (end - t);
         }
         let inside = mask32x16::from_bitmask(simd, u64::from(self.inside));
         let fresh = mask32x16::from_bitmask(simd, u64::from(self.fresh));
@@ -337,9 +341,26 @@ impl Walk {
 
     #[inline(always)]
     fn finish(&mut self, lane: usize, (t, surface): (f32, u32), hits: &mut Hits) {
-        let ray = self.ray[lane] as usize;
+        let ray = self.ray.0[lane] as usize;
         (hits.distance[ray], hits.surface[ray]) = (t, surface);
         self.alive &= !(1 << lane);
+    }
+}
+
+/// Takes rays in drops to where they leave these.
+fn leave_drops(within: (&Field, &Space), rays: &mut Rays, hits: &mut Hits) {
+    for ray in 0..rays.len() {
+        let medium = rays.medium[ray];
+        if medium < LIQUID {
+            match leave(within, (rays.origin(ray), rays.direction(ray)), medium) {
+                Left::Out(t, drop) => {
+                    (hits.distance[ray], hits.surface[ray]) = (t, drop);
+                    // There is no way to go on.
+                    rays.to[ray] = 0.0;
+                }
+                Left::Into(t) => rays.from[ray] = t,
+            }
+        }
     }
 }
 

@@ -38,47 +38,43 @@ pub(crate) fn sixteen<S: Simd>(simd: S, field: &Field, V3(place): V3<S>) -> V3<S
     let index = row * u32x16::splat(simd, stride as u32) + cell[0];
     let mut indices = Lanes([0_u32; LANES]);
     index.store_slice(&mut indices.0);
-    // Four along x in the four rows about the place; two along x in the eight rows around these.
-    let mut inner = [[Lanes([0.0; LANES]); 4]; 4];
-    let mut outer = [[Lanes([0.0; LANES]); 2]; 8];
+    // Four along x in the four rows about the place; two along x in the eight rows around these: beside along
+    // y, then along z.
     let (down, plane) = (stride, stride * dims[1]);
+    let about = [0, down, plane, plane + down].map(|row| row + plane - 1);
+    let beside = [plane - down, plane + 2 * down, 2 * plane - down, 2 * plane + 2 * down];
+    let beyond = [0, 3 * plane, down, 3 * plane + down];
+    let mut inner = [Lanes([[0.0; 4]; LANES]); 4];
+    let mut outer = [Lanes([[0.0; 2]; LANES]); 8];
     for lane in 0..LANES {
-        let first = indices.0[lane] as usize;
-        let starts = [first, first + down, first + plane, first + plane + down];
+        let near = &field.values[indices.0[lane] as usize - plane..][..3 * plane + down + 2];
         for r in 0..4 {
-            let values = &field.values[starts[r] - 1..starts[r] + 3];
-            for k in 0..4 {
-                inner[r][k].0[lane] = values[k];
-            }
-        }
-        // Beside along y, then along z.
-        let around = [
-            [starts[0] - down, starts[1] + down, starts[2] - down, starts[3] + down],
-            [starts[0] - plane, starts[2] + plane, starts[1] - plane, starts[3] + plane],
-        ];
-        for axis in 0..2 {
-            for r in 0..4 {
-                let values = &field.values[around[axis][r]..around[axis][r] + 2];
-                outer[4 * axis + r][0].0[lane] = values[0];
-                outer[4 * axis + r][1].0[lane] = values[1];
-            }
+            let at = about[r];
+            inner[r].0[lane] = [near[at], near[at + 1], near[at + 2], near[at + 3]];
+            outer[r].0[lane] = [near[beside[r]], near[beside[r] + 1]];
+            outer[4 + r].0[lane] = [near[beyond[r]], near[beyond[r] + 1]];
         }
     }
-    let load = |lanes: &Lanes<f32>| f32x16::from_slice(simd, &lanes.0);
+    let part = |row: &[f32], at: usize| f32x16::from_slice(simd, &row[at * LANES..][..LANES]);
     let mix = |a: f32x16<S>, b: f32x16<S>, u: f32x16<S>| (b - a).mul_add(u, a);
     let [ux, uy, uz] = u;
     // Along x in each row, then between rows.
     let (mut slopes, mut middles) = ([one; 4], [one; 4]);
     for r in 0..4 {
-        let [a, b, c, d] =
-            [load(&inner[r][0]), load(&inner[r][1]), load(&inner[r][2]), load(&inner[r][3])];
+        let row = inner[r].0.as_flattened();
+        let (one, other) =
+            (part(row, 0).deinterleave(part(row, 1)), part(row, 2).deinterleave(part(row, 3)));
+        let (a, c) = one.0.deinterleave(other.0);
+        let (b, d) = one.1.deinterleave(other.1);
         slopes[r] = mix(c - a, d - b, ux);
         middles[r] = mix(b, c, ux);
     }
     let gx = mix(mix(slopes[0], slopes[1], uy), mix(slopes[2], slopes[3], uy), uz);
     let mut sides = [one; 8];
     for r in 0..8 {
-        sides[r] = mix(load(&outer[r][0]), load(&outer[r][1]), ux);
+        let row = outer[r].0.as_flattened();
+        let (low, high) = part(row, 0).deinterleave(part(row, 1));
+        sides[r] = mix(low, high, ux);
     }
     // Rows before and behind, at the two sides of the cell.
     let near = mix(middles[1] - sides[0], sides[1] - middles[0], uy);

@@ -13,7 +13,7 @@ use motes_scene::exp;
 use crate::cut::{Body, Cuts};
 use crate::lanes::{LANES, Lanes, V3};
 use crate::normals::sixteen;
-use crate::rays::{Hits, LIQUID, OUTSIDE, Rays};
+use crate::rays::{Hits, LIQUID, OUTSIDE, Rays, within};
 use crate::shade::{Around, Optics};
 use crate::surroundings::{self, Sights, lane_of, store};
 
@@ -58,6 +58,8 @@ struct Paths<S: Simd> {
 /// Memory of one thread.
 #[derive(Default)]
 pub(crate) struct Desk {
+    /// Where samples are: x in one row, y in the other, in whole vectors.
+    pub places: [Vec<f32>; 2],
     now: Wave,
     next: Wave,
     hits: Hits,
@@ -140,23 +142,23 @@ impl Wave {
 }
 
 impl Caster<'_> {
-    /// The light at places of a picture (x in one row, y in the other; as long as `light` or longer, in whole
-    /// vectors), whose pixels are `finer` times as small as its rays say.
+    /// Adds the light at the desk's places of a picture, whose pixels are `finer` times as small as its rays say.
     pub fn trace(
         &self,
         (rays, finer): (&motes_scene::Rays, usize),
-        places: &[Vec<f32>; 2],
         (light, desk): (&mut [Vec4], &mut Desk),
     ) {
-        let wave = &mut desk.now;
-        wave.clear();
+        let Desk { places, now, .. } = &mut *desk;
+        now.clear();
         let spread = rays.pixel / finer as f32;
-        dispatch!(self.body.level, simd => set_out(simd, (self, rays, spread), (places, light.len()), wave));
+        dispatch!(self.body.level, simd => {
+            set_out(simd, (self, rays, spread), places, (now, light));
+        });
         for number in 1..=self.optics.depth {
             if desk.now.rays.len() == 0 {
                 break;
             }
-            let Desk { now, next, hits } = &mut *desk;
+            let Desk { now, next, hits, .. } = &mut *desk;
             next.clear();
             self.body.march(&mut now.rays, hits);
             dispatch!(self.body.level, simd => {
@@ -167,14 +169,15 @@ impl Caster<'_> {
     }
 }
 
-/// Begins the paths of all samples.
+/// Begins the paths of all samples; those that miss the liquid end here.
 #[simd]
 fn set_out<S: Simd>(
     simd: S,
     (caster, rays, spread): (&Caster<'_>, &motes_scene::Rays, f32),
-    (places, count): (&[Vec<f32>; 2], usize),
-    wave: &mut Wave,
+    places: &[Vec<f32>; 2],
+    (wave, light): (&mut Wave, &mut [Vec4]),
 ) {
+    let count = light.len();
     let lattice = &caster.body.field.lattice;
     let medium = |point: Vec3| caster.body.medium(lattice.place(point));
     let perspective = rays.projection == motes_scene::Projection::Perspective;
@@ -211,7 +214,10 @@ fn set_out<S: Simd>(
             spread: splat(spread),
         };
         let mask = mask32x16::from_bitmask(simd, mask);
-        wave.push(mask, &paths, (origin, direction), u32x16::from_slice(simd, &media.0));
+        let (_, [from, to]) = within(origin, direction, caster.body.space.bounds);
+        let near = mask & from.simd_lt(to);
+        wave.push(near, &paths, (origin, direction), u32x16::from_slice(simd, &media.0));
+        caster.miss(simd, (mask & !near, &paths), (origin, direction), light);
     }
 }
 
@@ -346,6 +352,25 @@ impl Caster<'_> {
         let voxel = f32x16::splat(simd, lattice.voxel);
         let origin = V3::splat(simd, lattice.low).along(place, voxel);
         Sights { origin, direction, reach, width: paths.width, spread: paths.spread }
+    }
+
+    /// Ends paths at once that never come near the liquid.
+    #[inline(always)]
+    fn miss<S: Simd>(
+        &self,
+        simd: S,
+        (mask, paths): (mask32x16<S>, &Paths<S>),
+        ray: (V3<S>, V3<S>),
+        light: &mut [Vec4],
+    ) {
+        if !mask.any_true() {
+            return;
+        }
+        let sights = self.sights(simd, paths, ray, f32x16::splat(simd, f32::INFINITY));
+        let met = surroundings::meet(simd, self.around, &sights, mask);
+        let shown = mask & (!met.any | mask32x16::splat(simd, self.around.shown));
+        count(shown, paths.sample, (light, 1.0));
+        add(shown & met.any, paths.sample, met.light, light);
     }
 
     /// Adds what some paths see of the surroundings, wherever these are.

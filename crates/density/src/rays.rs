@@ -10,6 +10,9 @@ pub(crate) const OUTSIDE: u32 = u32::MAX;
 /// The medium of a ray in the field; what is less is in the drop of that number.
 pub(crate) const LIQUID: u32 = u32::MAX - 1;
 
+/// Rays that there is room for at the least.
+const LEAST_ROOM: usize = 1024;
+
 /// Rays. Rows are longer than they are many: a vector may begin at any.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rays {
@@ -49,7 +52,7 @@ impl Rays {
     pub fn reserve(&mut self) {
         let need = self.count + 2 * LANES;
         if self.medium.len() < need {
-            let room = 2 * need;
+            let room = 2 * need.max(LEAST_ROOM);
             let rows = self.origin.iter_mut().chain(&mut self.direction).chain(&mut self.inverse);
             rows.chain([&mut self.from, &mut self.to]).for_each(|row| row.resize(room, 1.0));
             self.medium.resize(room, OUTSIDE);
@@ -93,26 +96,40 @@ impl Rays {
 
     /// Finds where all are in a box.
     #[inline(always)]
-    pub fn clip<S: Simd>(&mut self, simd: S, [low, high]: [Vec3; 2]) {
+    pub fn clip<S: Simd>(&mut self, simd: S, bounds: [Vec3; 2]) {
         self.reserve();
-        let least = f32x16::splat(simd, 1e-12);
         for at in (0..self.count).step_by(LANES) {
-            let mut from = f32x16::splat(simd, 0.0);
-            let mut to = f32x16::splat(simd, f32::INFINITY);
+            let origin = V3::load(simd, &self.origin, at);
+            let (inverse, [from, to]) = within(origin, V3::load(simd, &self.direction, at), bounds);
             for a in 0..3 {
-                let o = f32x16::from_slice(simd, &self.origin[a][at..at + LANES]);
-                let d = f32x16::from_slice(simd, &self.direction[a][at..at + LANES]);
-                let d = d.abs().max(least).copysign(d);
-                let inverse = f32x16::splat(simd, 1.0) / d;
-                inverse.store_slice(&mut self.inverse[a][at..at + LANES]);
-                let (one, other) = ((low[a] - o) * inverse, (high[a] - o) * inverse);
-                from = from.max(one.min(other));
-                to = to.min(one.max(other));
+                inverse.0[a].store_slice(&mut self.inverse[a][at..at + LANES]);
             }
             from.store_slice(&mut self.from[at..at + LANES]);
             to.store_slice(&mut self.to[at..at + LANES]);
         }
     }
+}
+
+/// One over the directions of sixteen rays, and where these enter and leave a box: not before they begin.
+#[inline(always)]
+pub(crate) fn within<S: Simd>(
+    origin: V3<S>,
+    direction: V3<S>,
+    [low, high]: [Vec3; 2],
+) -> (V3<S>, [f32x16<S>; 2]) {
+    let simd = origin.0[0].token();
+    let (least, one) = (f32x16::splat(simd, 1e-12), f32x16::splat(simd, 1.0));
+    let mut from = f32x16::splat(simd, 0.0);
+    let mut to = f32x16::splat(simd, f32::INFINITY);
+    let mut inverse = direction;
+    for a in 0..3 {
+        let (o, d) = (origin.0[a], direction.0[a]);
+        inverse.0[a] = one / d.abs().max(least).copysign(d);
+        let (near, far) = ((low[a] - o) * inverse.0[a], (high[a] - o) * inverse.0[a]);
+        from = from.max(near.min(far));
+        to = to.min(near.max(far));
+    }
+    (inverse, [from, to])
 }
 
 impl Hits {

@@ -8,9 +8,11 @@
 
 use std::ops::Range;
 
+use motes_grid::Radii;
 use rayon::prelude::*;
 
-use crate::bins::Bins;
+use crate::bins::Tiles;
+use crate::fine::Desk;
 use crate::lattice::Lattice;
 use crate::params::Particles;
 
@@ -52,14 +54,14 @@ impl Rough {
     /// Finds what is saturated; `reach` is the particles' greatest, in voxels.
     pub fn fill(
         &mut self,
-        (bins, particles): (&Bins, &Particles<'_>),
+        (desks, tiles, particles): (&[Desk], Tiles, &Particles<'_>),
         lattice: &Lattice,
         (edge, reach): (usize, f32),
     ) {
         self.edge = edge;
         self.dims = lattice.dims.map(|n| n.div_ceil(edge));
-        self.sum(bins, particles, lattice);
-        self.find_full(bins);
+        self.sum((desks, tiles), particles, lattice);
+        self.find_full(tiles);
         self.erode_saturated(1);
         self.core.clone_from(&self.saturated);
         std::mem::swap(&mut self.core, &mut self.saturated);
@@ -68,38 +70,50 @@ impl Rough {
     }
 
     /// Rows of cells along a tile's edge.
-    fn rows(&self, bins: &Bins) -> usize {
-        bins.tiles.edge / self.edge
+    fn rows(&self, tiles: Tiles) -> usize {
+        tiles.edge / self.edge
     }
 
     /// Adds up volumes, each tile those of its own particles.
-    fn sum(&mut self, bins: &Bins, particles: &Particles<'_>, lattice: &Lattice) {
-        let (rows, [along, ..]) = (self.rows(bins), self.dims);
+    fn sum(
+        &mut self,
+        (desks, tiles): (&[Desk], Tiles),
+        particles: &Particles<'_>,
+        lattice: &Lattice,
+    ) {
+        let (rows, [along, ..]) = (self.rows(tiles), self.dims);
         let shift = self.edge.trailing_zeros();
+        let volume = |radius: f32| (2.0 * radius / lattice.voxel).powi(3);
         self.volumes.clear();
-        self.volumes.resize(bins.tiles.count() * rows * rows * along, 0.0);
+        self.volumes.resize(tiles.count() * rows * rows * along, 0.0);
         let of_tiles = self.volumes.par_chunks_mut(rows * rows * along);
-        of_tiles.enumerate().for_each(|(tile, volumes)| {
-            let [first_y, first_z] = bins.tiles.first(tile);
-            for entry in bins.of(tile).flatten() {
-                let [x, y, z] = entry.cell();
-                let row = ((z - first_z) >> shift) * rows + ((y - first_y) >> shift);
-                let width = 2.0 * particles.radius(entry.index as usize) / lattice.voxel;
-                volumes[row * along + (x >> shift)] += width * width * width;
+        of_tiles.zip(desks).for_each(|(volumes, desk)| {
+            for fine in 0..desk.rows() {
+                let [y, z] = [fine % tiles.edge >> shift, fine / tiles.edge >> shift];
+                let volumes = &mut volumes[(z * rows + y) * along..][..along];
+                for x in 0..desk.across() {
+                    let (_, own) = desk.cell(fine, x);
+                    volumes[x >> shift] += match particles.radii {
+                        Radii::Uniform(radius) => own.len() as f32 * volume(radius),
+                        Radii::Each(all) => {
+                            own.iter().map(|entry| volume(all[entry.index as usize])).sum()
+                        }
+                    };
+                }
             }
         });
     }
 
     /// Full cells, for now as the saturated ones.
-    fn find_full(&mut self, bins: &Bins) {
-        let (rows, [nx, ny, nz]) = (self.rows(bins), self.dims);
+    fn find_full(&mut self, tiles: Tiles) {
+        let (rows, [nx, ny, nz]) = (self.rows(tiles), self.dims);
         let full = FULL * (self.edge * self.edge * self.edge) as f32;
         self.saturated.clear();
         self.saturated.resize(nx * ny * nz, 0);
         let volumes = &self.volumes;
         self.saturated.par_chunks_mut(nx * ny).enumerate().for_each(|(z, plane)| {
             for (y, row) in plane.chunks_mut(nx).enumerate() {
-                let tile = z / rows * bins.tiles.dims[0] + y / rows;
+                let tile = z / rows * tiles.dims[0] + y / rows;
                 let from = ((tile * rows + z % rows) * rows + y % rows) * nx;
                 for (cell, volume) in row.iter_mut().zip(&volumes[from..from + nx]) {
                     *cell = u8::from(*volume >= full);

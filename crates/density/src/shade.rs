@@ -151,9 +151,10 @@ impl Artist<'_> {
             let columns = left..(left + TILE).min(width);
             let rows = 0..colors.len() / width;
             pixels.clear();
-            pixels.extend(
-                rows.flat_map(|y| columns.clone().map(move |x| (begin + y * width + x) as u32)),
-            );
+            for y in rows {
+                let row = (begin + y * width) as u32;
+                pixels.extend(row + columns.start as u32..row + columns.end as u32);
+            }
             draw(&mut pixels, &mut light);
             for (pixel, light) in pixels.iter().zip(&light) {
                 colors[*pixel as usize - begin] = light.to_array();
@@ -168,18 +169,25 @@ impl Artist<'_> {
         samples: impl IntoIterator<Item = usize>,
         (light, desk): (&mut Vec<Vec4>, &mut Desk),
     ) {
-        let (width, finer) = (self.view.size.0 as usize, self.finer);
+        let (width, finer) = (self.view.size.0, self.finer);
         light.clear();
         light.resize(pixels.len(), Vec4::ZERO);
         let room = pixels.len().next_multiple_of(LANES);
-        let mut places = [vec![0.0; room], vec![0.0; room]];
+        desk.places.iter_mut().for_each(|row| row.resize(room, 0.0));
         for sample in samples {
             let offset = [sample % finer, sample / finer].map(|i| (i as f32 + 0.5) / finer as f32);
-            for (i, pixel) in pixels.iter().enumerate() {
-                let [x, y] = [*pixel as usize % width, *pixel as usize / width];
-                (places[0][i], places[1][i]) = (x as f32 + offset[0], y as f32 + offset[1]);
+            let [xs, ys] = &mut desk.places;
+            // Row by row.
+            let (mut row, mut end) = (0, 0);
+            for ((pixel, x), y) in pixels.iter().zip(xs).zip(ys) {
+                if *pixel >= end {
+                    row = pixel / width;
+                    end = (row + 1) * width;
+                }
+                *x = (pixel + width - end) as f32 + offset[0];
+                *y = row as f32 + offset[1];
             }
-            self.caster.trace((&self.view.rays, finer), &places, (light, desk));
+            self.caster.trace((&self.view.rays, finer), (light, desk));
         }
     }
 }
