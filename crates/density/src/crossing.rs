@@ -78,20 +78,21 @@ pub(crate) fn crossing<S: Simd>(
     let (zero, none) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
     let start = cubic.0[0];
     let at_once = !fresh & start.simd_ge(zero);
-    // The first part at whose end the sign has changed.
-    let (mut low, mut high, mut low_value, mut high_value) = (none, none, zero, zero);
-    let (mut before, mut open) = (start, mask32x16::splat(simd, true));
+    let mut values = [start; PARTS + 1];
     for part in 1..=PARTS {
-        let s = f32x16::splat(simd, part as f32 / PARTS as f32);
-        let value = cubic.at(s);
-        let here = open & before.simd_lt(zero) & value.simd_ge(zero);
-        low = here.select(s - 1.0 / PARTS as f32, low);
-        high = here.select(s, high);
-        low_value = here.select(before, low_value);
-        high_value = here.select(value, high_value);
-        open &= !here;
-        before = value;
+        values[part] = cubic.at(f32x16::splat(simd, part as f32 / PARTS as f32));
     }
+    // The first part at whose end the sign has changed: the last that is found from the end on.
+    let (mut low, mut low_value, mut high_value) = (none, zero, zero);
+    let mut found = mask32x16::splat(simd, false);
+    for part in (0..PARTS).rev() {
+        let here = values[part].simd_lt(zero) & values[part + 1].simd_ge(zero);
+        low = here.select(f32x16::splat(simd, part as f32 / PARTS as f32), low);
+        low_value = here.select(values[part], low_value);
+        high_value = here.select(values[part + 1], high_value);
+        found |= here;
+    }
+    let mut high = low + 1.0 / PARTS as f32;
     // The false position, again and again: the crossing stays between.
     let tiny = f32x16::splat(simd, f32::MIN_POSITIVE);
     let mut s = low;
@@ -106,7 +107,7 @@ pub(crate) fn crossing<S: Simd>(
             high_value = before.select(high_value, value);
         }
     }
-    at_once.select(zero, (!open).select(s, none))
+    at_once.select(zero, found.select(s, none))
 }
 
 #[cfg(test)]

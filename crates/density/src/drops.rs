@@ -45,10 +45,11 @@ impl Drops {
             .par_iter()
             .map(|desk| {
                 let mut found = Vec::new();
-                for row in 0..desk.rows() {
-                    for x in 0..desk.across() {
-                        let (cell, own) = desk.cell(row, x);
-                        if !own.is_empty() && !inside.get(cell) {
+                for row in desk.rows() {
+                    let [y, z] = row.at;
+                    for x in 0..row.len() {
+                        let own = row.of(x);
+                        if !own.is_empty() && !inside.get([x, y, z]) {
                             let drop = |e: &Entry| drop_of(field, e, (particles, params));
                             found.extend(own.iter().filter_map(drop));
                         }

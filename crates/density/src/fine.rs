@@ -93,6 +93,24 @@ struct Bump {
     height: f32,
     /// That over the square of its reach to the lower and to the higher side.
     steep: [[f32; 2]; 3],
+    /// What is taken from the height at the nodes along z of a block.
+    down: [f32; HIGH],
+}
+
+impl Bump {
+    /// Looks at the nodes from `first` on, counted from that of the cell.
+    #[inline(always)]
+    fn look_down<S: Simd, const MASKED: bool>(&mut self, simd: S, first: f32) {
+        let z = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + first;
+        let [low, high] = self.steep[2];
+        let (low, high) = (f32x8::splat(simd, low), f32x8::splat(simd, high));
+        let steep = match MASKED {
+            true => z.simd_le(f32x8::splat(simd, 0.0)).select(low, high),
+            false => low,
+        };
+        let d = z - self.at[2];
+        (d * d * steep).store_slice(&mut self.down);
+    }
 }
 
 impl<'a> Source<'a> {
@@ -128,7 +146,7 @@ impl<'a> Source<'a> {
         let Spread { reach: far, height, steep } = spread;
         let [x, y, z] = entry.at;
         let at = [x - cell[0], y - cell[1], z - cell[2]];
-        let mut bump = Bump { at, height, steep: [[steep; 2]; 3] };
+        let mut bump = Bump { at, height, steep: [[steep; 2]; 3], down: [0.0; HIGH] };
         let mut greatest = far;
         if MASKED && let Some(masks) = self.particles.masks {
             let (mask, least) = (&masks[index], LEAST_REACH.min(far));
@@ -143,8 +161,14 @@ impl<'a> Source<'a> {
                 [side(3, z.min(x)), side(2, z.min(x))],
                 [side(5, x.min(y)), side(4, x.min(y))],
             ];
-            bump.steep = sides.map(|sides| sides.map(|r| height / (r * r)));
-            greatest = sides.as_flattened().iter().fold(0.0, |a, b| a.max(*b));
+            greatest = 0.0;
+            for axis in 0..3 {
+                for side in 0..2 {
+                    let r = sides[axis][side];
+                    bump.steep[axis][side] = height / (r * r);
+                    greatest = r.max(greatest);
+                }
+            }
         }
         (bump, greatest)
     }
@@ -173,25 +197,36 @@ impl Desk {
         sort(&mut self.starts, count, from, entries);
     }
 
-    /// Rows of cells; none if there are no particles.
+    /// The rows of cells that have particles.
     #[inline(always)]
-    pub fn rows(&self) -> usize {
-        (self.starts.len().saturating_sub(2)) / self.across.max(1)
+    pub fn rows(&self) -> impl Iterator<Item = Cells<'_>> {
+        let starts = self.starts.windows(self.across + 1).step_by(self.across.max(1));
+        let place = |row: usize| [self.first[0] + row % self.edge, self.first[1] + row / self.edge];
+        let rows = starts.take(self.edge * self.edge).enumerate();
+        rows.filter(|(_, starts)| starts[0] < starts[starts.len() - 1])
+            .map(move |(row, starts)| Cells { at: place(row), starts, entries: &self.entries })
+    }
+}
+
+/// A row of cells, and the particles in them.
+pub(crate) struct Cells<'a> {
+    /// Along y and z.
+    pub at: [usize; 2],
+    starts: &'a [u32],
+    entries: &'a [Entry],
+}
+
+impl<'a> Cells<'a> {
+    /// How many there are.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
     }
 
-    /// Cells in a row.
+    /// The particles in one.
     #[inline(always)]
-    pub fn across(&self) -> usize {
-        self.across
-    }
-
-    /// A cell of a row, and the particles in it.
-    #[inline(always)]
-    pub fn cell(&self, row: usize, x: usize) -> ([usize; 3], &[Entry]) {
-        let at = row * self.across + x;
-        let own = self.starts[at] as usize..self.starts[at + 1] as usize;
-        let [y, z] = [self.first[0] + row % self.edge, self.first[1] + row / self.edge];
-        ([x, y, z], &self.entries[own])
+    pub fn of(&self, x: usize) -> &'a [Entry] {
+        &self.entries[self.starts[x] as usize..self.starts[x + 1] as usize]
     }
 }
 
@@ -205,14 +240,14 @@ pub(crate) fn add<S: Simd, const MASKED: bool, const SATURATES: bool, const COUN
 ) {
     let mut bumps = std::mem::take(&mut desk.bumps);
     let (mut visits, mut updates) = (0, 0);
-    for row in 0..desk.rows() {
-        for x in 0..desk.across {
-            let (cell, own) = desk.cell(row, x);
+    for row in desk.rows() {
+        for x in 0..row.len() {
+            let (cell, own) = ([x, row.at[0], row.at[1]], row.of(x));
             if own.is_empty() || source.rough.is_some_and(|rough| rough.is_core(cell)) {
                 continue;
             }
             visits += own.len() as u64;
-            let corner = cell.map(|c| c as f32);
+            let corner = [cell[0] as f32, cell[1] as f32, cell[2] as f32];
             let mut far = 0.0_f32;
             bumps.clear();
             for entry in own {
@@ -220,7 +255,7 @@ pub(crate) fn add<S: Simd, const MASKED: bool, const SATURATES: bool, const COUN
                 bumps.push(bump);
                 far = far.max(reach);
             }
-            let made = (&bumps[..], cell);
+            let made = (&mut bumps[..], cell);
             let near = (far.ceil() as usize, source.params.saturation);
             updates += match near.0 {
                 ..=2 => in_blocks::<S, 4, 4, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
@@ -244,17 +279,23 @@ fn in_blocks<
     const COUNTED: bool,
 >(
     simd: S,
-    (bumps, cell): (&[Bump], [usize; 3]),
+    (bumps, cell): (&mut [Bump], [usize; 3]),
     (half, limit): (usize, f32),
     rows: &mut Rows<'_>,
 ) -> u64 {
     let (first, nodes, mut written) = (1 - half as i32, 2 * half, 0);
-    let begin = [cell[0], cell[1] - rows.first[0], cell[2] - rows.first[1]];
+    // The density of a particle ends within the lattice.
+    let from = |at: usize| at.saturating_sub(half - 1);
+    let begin = [from(cell[0]), from(cell[1] - rows.first[0]), from(cell[2] - rows.first[1])];
     for z in (0..nodes).step_by(Z) {
+        for bump in &mut *bumps {
+            bump.look_down::<S, MASKED>(simd, (first + z as i32) as f32);
+        }
         for y in (0..nodes).step_by(LANES / X) {
             for x in (0..nodes).step_by(X) {
-                let from = [x, y, z].map(|v| first + v as i32);
-                let at = [0, 1, 2].map(|a| begin[a].wrapping_add_signed(from[a] as isize));
+                // The density of a particle ends within the lattice.
+                let at = [begin[0] + x, begin[1] + y, begin[2] + z];
+                let from = [first + x as i32, first + y as i32, first + z as i32];
                 let mut open = [0xffff; Z];
                 if COUNTED && SATURATES {
                     open = rows.below::<X, Z>(at, limit);
@@ -279,37 +320,27 @@ fn sum<S: Simd, const X: usize, const Z: usize, const MASKED: bool, const COUNTE
     bumps: &[Bump],
     (from, open): ([i32; 3], [u64; Z]),
 ) -> ([f32x16<S>; Z], u64) {
-    let count = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
     let mut places = [[0.0; LANES]; 2];
     for i in 0..LANES {
-        places[0][i] = (from[0] + (count[i] % X) as i32) as f32;
-        places[1][i] = (from[1] + (count[i] / X) as i32) as f32;
+        places[0][i] = (from[0] + (i % X) as i32) as f32;
+        places[1][i] = (from[1] + (i / X) as i32) as f32;
     }
     let zero = f32x16::splat(simd, 0.0);
     let x = f32x16::from_slice(simd, &places[0]);
     let y = f32x16::from_slice(simd, &places[1]);
-    let z = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + from[2] as f32;
     let (mut sums, mut written) = ([zero; Z], 0);
     for bump in bumps {
-        let (dx, dy, dz) = (x - bump.at[0], y - bump.at[1], z - bump.at[2]);
-        let (across, down) = match MASKED {
+        let (dx, dy) = (x - bump.at[0], y - bump.at[1]);
+        let across = match MASKED {
             true => {
-                let side = |of: [f32; 2], from: f32x16<S>| {
-                    let [low, high] = of.map(|steep| f32x16::splat(simd, steep));
-                    from.simd_le(zero).select(low, high)
-                };
-                let [low, high] = bump.steep[2].map(|steep| f32x8::splat(simd, steep));
-                let down = z.simd_le(f32x8::splat(simd, 0.0)).select(low, high);
-                let along = dx * dx * side(bump.steep[0], x) + dy * dy * side(bump.steep[1], y);
-                (along, dz * dz * down)
+                let [along, beside, _] = bump.steep;
+                dx * dx * side(simd, along, x) + dy * dy * side(simd, beside, y)
             }
-            false => ((dx * dx + dy * dy) * bump.steep[0][0], dz * dz * bump.steep[0][0]),
+            false => (dx * dx + dy * dy) * bump.steep[0][0],
         };
         let left = f32x16::splat(simd, bump.height) - across;
-        let mut downs = [0.0; HIGH];
-        down.store_slice(&mut downs);
         for k in 0..Z {
-            let w = (left - downs[k]).max(zero);
+            let w = (left - bump.down[k]).max(zero);
             sums[k] += w * w * w;
             if COUNTED {
                 written += u64::from((w.simd_gt(zero).to_bitmask() & open[k]).count_ones());
@@ -317,6 +348,13 @@ fn sum<S: Simd, const X: usize, const Z: usize, const MASKED: bool, const COUNTE
         }
     }
     (sums, written)
+}
+
+/// Of two numbers the one of the side that each node is on.
+#[inline(always)]
+fn side<S: Simd>(simd: S, [low, high]: [f32; 2], node: f32x16<S>) -> f32x16<S> {
+    let below = node.simd_le(f32x16::splat(simd, 0.0));
+    below.select(f32x16::splat(simd, low), f32x16::splat(simd, high))
 }
 
 impl Rows<'_> {

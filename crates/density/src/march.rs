@@ -107,7 +107,8 @@ impl Walk {
         (rays, next): (&Rays, &mut usize),
         hits: &mut Hits,
     ) -> bool {
-        if LANES as u32 - self.alive.count_ones() >= IDLE {
+        // Some of them may have nowhere to go.
+        while LANES as u32 - self.alive.count_ones() >= IDLE && *next < rays.len() {
             self.refill(simd, rays, next);
         }
         if self.alive == 0 {

@@ -84,17 +84,21 @@ impl Rough {
         let (rows, [along, ..]) = (self.rows(tiles), self.dims);
         let shift = self.edge.trailing_zeros();
         let volume = |radius: f32| (2.0 * radius / lattice.voxel).powi(3);
+        let same = volume(particles.radius(0));
         self.volumes.clear();
         self.volumes.resize(tiles.count() * rows * rows * along, 0.0);
         let of_tiles = self.volumes.par_chunks_mut(rows * rows * along);
         of_tiles.zip(desks).for_each(|(volumes, desk)| {
-            for fine in 0..desk.rows() {
-                let [y, z] = [fine % tiles.edge >> shift, fine / tiles.edge >> shift];
+            for row in desk.rows() {
+                let [y, z] = row.at.map(|v| v % tiles.edge >> shift);
                 let volumes = &mut volumes[(z * rows + y) * along..][..along];
-                for x in 0..desk.across() {
-                    let (_, own) = desk.cell(fine, x);
+                for x in 0..row.len() {
+                    let own = row.of(x);
+                    if own.is_empty() {
+                        continue;
+                    }
                     volumes[x >> shift] += match particles.radii {
-                        Radii::Uniform(radius) => own.len() as f32 * volume(radius),
+                        Radii::Uniform(_) => own.len() as f32 * same,
                         Radii::Each(all) => {
                             own.iter().map(|entry| volume(all[entry.index as usize])).sum()
                         }
