@@ -70,10 +70,10 @@ impl Field {
         let params = &Params { voxel, ..*params };
         self.lattice = Lattice::new((survey.low, survey.high), radius, params);
         let lattice = self.lattice;
-        // Tiles that are not neighbours share no row.
         let far = reach(radius, lattice.voxel, params) / lattice.voxel;
         let half = far.ceil() as usize;
         let rough_edge = rough::edge(mean, lattice.voxel);
+        // Of tiles that are not neighbours, particles reach no row in common.
         let edge = (2 * half - 1).max(rough_edge).max(TILE).next_power_of_two();
         self.bins.fill(particles, &lattice, edge);
         let Self { bins, desks, .. } = self;
@@ -85,10 +85,23 @@ impl Field {
         if params.rough {
             self.rough.fill((desks, bins.tiles, particles), &lattice, (rough_edge, far));
         }
-        let rough = params.rough.then_some(&self.rough);
+        self.add::<COUNTED>(particles, params, (half, level));
+        let sum = |of: fn(&Desk) -> u64| self.desks.iter().map(of).sum();
+        let (visits, updates) = (sum(|desk| desk.visits), sum(|desk| desk.updates));
+        self.counts = Counts { particles: survey.count as u64, visits, updates };
+    }
+
+    /// Adds up the densities of all particles, which are sorted; the colors of tiles one after the other.
+    fn add<const COUNTED: bool>(
+        &mut self,
+        particles: &Particles<'_>,
+        params: &Params,
+        (half, level): (usize, Level),
+    ) {
+        let (stride, lattice) = (self.stride(), self.lattice);
+        let Self { values, bins, desks, rough, .. } = self;
+        let rough = params.rough.then_some(&*rough);
         let source = Source::new(*particles, (&lattice, params), rough);
-        let stride = self.stride();
-        let Self { values, bins, desks, .. } = self;
         values.resize(stride * lattice.dims[1] * lattice.dims[2], 0.0);
         begin(values, stride, &source);
         let masked = params.masked && particles.masks.is_some();
@@ -103,12 +116,6 @@ impl Field {
                 });
             });
         }
-        let sum = |of: fn(&Desk) -> u64| desks.iter().map(of).sum();
-        self.counts = Counts {
-            particles: survey.count as u64,
-            visits: sum(|t| t.visits),
-            updates: sum(|t| t.updates),
-        };
     }
 
     /// Numbers in a row: a vector may begin at any node.

@@ -369,8 +369,9 @@ impl Caster<'_> {
         let sights = self.sights(simd, paths, ray, f32x16::splat(simd, f32::INFINITY));
         let met = surroundings::meet(simd, self.around, &sights, mask);
         let shown = mask & (!met.any | mask32x16::splat(simd, self.around.shown));
-        count(shown, paths.sample, (light, 1.0));
-        add(shown & met.any, paths.sample, met.light, light);
+        let nothing = V3::splat(simd, Vec3::ZERO);
+        let seen = V3::select(met.any, met.light, nothing);
+        add_covered(shown, paths.sample, seen, (light, 1.0));
     }
 
     /// Adds what some paths see of the surroundings, wherever these are.
@@ -533,9 +534,20 @@ fn transmitted<S: Simd>(absorption: V3<S>, length: f32x16<S>) -> V3<S> {
     V3([exp(simd, -(r * length)), exp(simd, -(g * length)), exp(simd, -(b * length))])
 }
 
-/// Adds light to the samples of some paths, one after the other.
+/// Adds light to the samples of some paths.
 #[inline(always)]
 fn add<S: Simd>(mask: mask32x16<S>, sample: u32x16<S>, more: V3<S>, light: &mut [Vec4]) {
+    add_covered(mask, sample, more, (light, 0.0));
+}
+
+/// Adds light to the samples of some paths, one after the other, and to how much of these is covered.
+#[inline(always)]
+fn add_covered<S: Simd>(
+    mask: mask32x16<S>,
+    sample: u32x16<S>,
+    more: V3<S>,
+    (light, cover): (&mut [Vec4], f32),
+) {
     let rows = store(more);
     let mut samples = Lanes([0_u32; LANES]);
     sample.store_slice(&mut samples.0);
@@ -543,7 +555,7 @@ fn add<S: Simd>(mask: mask32x16<S>, sample: u32x16<S>, more: V3<S>, light: &mut 
     while left != 0 {
         let lane = left.trailing_zeros() as usize;
         left &= left - 1;
-        light[samples.0[lane] as usize] += lane_of(&rows, lane).extend(0.0);
+        light[samples.0[lane] as usize] += lane_of(&rows, lane).extend(cover);
     }
 }
 

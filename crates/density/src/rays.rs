@@ -52,7 +52,7 @@ impl Rays {
     pub fn reserve(&mut self) {
         let need = self.count + 2 * LANES;
         if self.medium.len() < need {
-            let room = 2 * need.max(LEAST_ROOM);
+            let room = (2 * self.count).max(LEAST_ROOM) + 2 * LANES;
             let rows = self.origin.iter_mut().chain(&mut self.direction).chain(&mut self.inverse);
             rows.chain([&mut self.from, &mut self.to]).for_each(|row| row.resize(room, 1.0));
             self.medium.resize(room, OUTSIDE);

@@ -90,7 +90,7 @@ impl Rough {
         let of_tiles = self.volumes.par_chunks_mut(rows * rows * along);
         of_tiles.zip(desks).for_each(|(volumes, desk)| {
             for row in desk.rows() {
-                let [y, z] = row.at.map(|v| v % tiles.edge >> shift);
+                let [y, z] = row.at.map(|v| (v % tiles.edge) >> shift);
                 let volumes = &mut volumes[(z * rows + y) * along..][..along];
                 for x in 0..row.len() {
                     let own = row.of(x);
