@@ -32,6 +32,7 @@ pub mod march;
 mod media;
 pub mod normals;
 mod occlusion;
+pub mod packet;
 mod params;
 pub mod recursion;
 pub mod reference;
