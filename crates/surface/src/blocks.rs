@@ -116,7 +116,7 @@ pub(crate) struct Places {
 /// The blocks of a picture.
 ///
 /// Of columns and blocks alike rays see records, which say less than is known, but are small: four whole numbers of 16
-/// bits, a, d, b and c, that nearness becomes by a function that never falls, [`Blocks::scale`]. Outside the liquid are
+/// bits, a, d, b and c, that nearness becomes by a function that never falls. Outside the liquid are
 /// what is more than a, and what is less than d. If d is even, what is between c and b is outside, too, and what is
 /// between b and a and between d + 1 and c inside. If it is odd, b and c are the place of all surfaces of the column.
 #[derive(Clone, Debug)]
@@ -241,7 +241,7 @@ fn of_column(ends: &[f32], scale: [f32; 2], many: &mut Vec<Many>) -> [u32; 2] {
     };
     if !ends.is_sorted_by(|near, far| near >= far) {
         // Where smoothing has turned a span inside out, nothing is known.
-        return [ENDS[1] as u32 + 1 | 1 << 16, u32::MAX];
+        return [(ENDS[1] as u32 + 1) | (1 << 16), u32::MAX];
     }
     let [a, b, d] = [a, b, d].map(|nearness| whole(nearness, scale));
     if ends.len() > 4 {

@@ -85,7 +85,8 @@ pub fn march_together(
     let (mut lines, mut order) = (Vec::with_capacity(rays.len()), Vec::with_capacity(rays.len()));
     let mut columns = 0;
     for inside in [true, false] {
-        (lines.clear(), order.clear());
+        lines.clear();
+        order.clear();
         for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.inside == inside) {
             if let Some(line) = Line::new(surfaces, ray) {
                 lines.push(line);
@@ -280,9 +281,9 @@ impl<S: Simd> Axis16<S> {
         let mut going = going & all & !last.simd_eq(end);
         while going.any_true() {
             let next = self.reaches(last + self.up);
-            going = going & (next.simd_lt(wall) | (first & next.simd_eq(wall)));
+            going &= next.simd_lt(wall) | (first & next.simd_eq(wall));
             last = going.select(last + step, last);
-            going = going & !last.simd_eq(end);
+            going &= !last.simd_eq(end);
         }
         last
     }

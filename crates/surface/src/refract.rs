@@ -163,7 +163,8 @@ impl<'a> Paths<'a> {
                     kept += 1;
                 }
             }
-            (paths.truncate(kept), rays.truncate(kept));
+            paths.truncate(kept);
+            rays.truncate(kept);
         }
         (self.rays, self.paths, self.hits) = (rays, paths, hits);
     }

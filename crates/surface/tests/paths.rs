@@ -150,7 +150,8 @@ fn blocks_change_no_hit() {
             let ((a, all), (b, some)) =
                 (march(&surfaces, &ray), march_blocks((&surfaces, &blocks), &ray));
             assert_eq!(a, b, "{projection:?}: {ray:?}");
-            (rays.push(ray), expected.push(a));
+            rays.push(ray);
+            expected.push(a);
             (hits, plain, skipped) =
                 (hits + u32::from(a.is_some()), plain + all, skipped + all - some.min(all));
         }
