@@ -48,11 +48,6 @@ impl Stretch {
         if other.length() > self.length() { other } else { self }
     }
 
-    #[inline]
-    fn holds(self, [low, high]: [f32; 2]) -> bool {
-        self.low < low && high < self.high
-    }
-
     fn is_some(self) -> bool {
         self.low < self.high
     }
@@ -83,6 +78,19 @@ impl Block {
         let behind = Stretch { low: f32::NEG_INFINITY, high: self.behind };
         [before, self.between, behind]
     }
+
+    /// For rays outside.
+    fn outside_record(&self, scale: [f32; 2]) -> [u32; 2] {
+        let Self { before, behind, between, .. } = self;
+        record([*before, between.high, between.low, *behind].map(|n| whole(n, scale)))
+    }
+
+    /// For rays inside.
+    fn inside_record(&self, scale: [f32; 2]) -> [u32; 2] {
+        let Stretch { low, high } = self.inside;
+        let [low, high] = [low, high].map(|n| whole(n, scale));
+        record([high, low, 0, 0])
+    }
 }
 
 /// The blocks of one size.
@@ -93,38 +101,104 @@ struct Size {
     down: usize,
 }
 
+/// Numbers of the levels, the columns' first.
+type PerLevel = [i32; LEVELS as usize + 1];
+
+/// Where the records of columns and blocks stand: sixteen after sixteen, those of a block of the next level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Places {
+    /// The first of each level.
+    pub first: PerLevel,
+    /// Blocks of the next level side by side.
+    pub across: PerLevel,
+}
+
 /// The blocks of a picture.
+///
+/// Of columns and blocks alike rays see records, which say less than is known, but are small: four whole numbers of 16
+/// bits, a, d, b and c, that nearness becomes by a function that never falls. Outside the liquid are
+/// what is more than a, and what is less than d. If d is even, what is between c and b is outside, too, and what is
+/// between b and a and between d + 1 and c inside. If it is odd, b and c are the place of all surfaces of the column.
 #[derive(Clone, Debug)]
 pub struct Blocks {
-    /// Those of level 1 first.
-    levels: Vec<Size>,
+    /// Of all columns, and of all blocks once for rays inside and once for rays outside; a in the lower half of the first
+    /// word, b in that of the second.
+    pub(crate) records: Vec<[u32; 2]>,
+    /// The surfaces of columns that have many, front to back, then 0, for each row of blocks.
+    pub(crate) many: Vec<Vec<Many>>,
+    /// For rays outside, for rays inside.
+    pub(crate) places: [Places; 2],
+    /// Of nearness: what 1 stands for, and how many whole numbers there are to a unit.
+    pub(crate) scale: [f32; 2],
     /// What rays go through them with.
     pub(crate) level: Level,
 }
 
+/// Surfaces of a column.
+pub(crate) type Many = [u16; 16];
+
+/// The least and the greatest of what finite nearness becomes.
+pub(crate) const ENDS: [i32; 2] = [1, 0xfffe];
+
+/// Records of a block's parts.
+const PARTS: usize = EDGE * EDGE;
+
 impl Blocks {
     /// The blocks of all columns.
     pub fn new(level: Level, surfaces: &Surfaces) -> Self {
-        let [width, height] = [surfaces.view.size.0 as usize, surfaces.view.size.1 as usize];
+        let view = &surfaces.view;
+        let [width, height] = [view.size.0 as usize, view.size.1 as usize];
         let [across, down] = [width.div_ceil(EDGE), height.div_ceil(EDGE)];
+        let [far, near] = [view.nearness(view.far), view.nearness(view.near)];
+        let per_unit = (ENDS[1] - ENDS[0]) as f32 / (near - far);
+        let scale = [far, if per_unit.is_finite() { per_unit } else { 0.0 }];
         let mut blocks = vec![Block::NOTHING; across * down];
-        let rows = blocks.par_chunks_mut(across.max(1)).enumerate();
-        rows.for_each_init(Vec::new, |common, (row, blocks)| {
+        let mut records = vec![[0; 2]; across * down * PARTS];
+        let rows = blocks.par_chunks_mut(across.max(1));
+        let mut many = vec![Vec::new(); down];
+        let rows =
+            rows.zip(records.par_chunks_mut((across * PARTS).max(1))).zip(&mut many).enumerate();
+        rows.for_each_init(Vec::new, |common, (row, ((blocks, records), many))| {
             let ys = row * EDGE..(row * EDGE + EDGE).min(height);
             for (x, block) in blocks.iter_mut().enumerate() {
                 let xs = x * EDGE..(x * EDGE + EDGE).min(width);
+                for y in ys.clone() {
+                    let first = x * PARTS + y % EDGE * EDGE;
+                    for (record, x) in records[first..].iter_mut().zip(xs.clone()) {
+                        let ends = &surfaces.nearness[surfaces.of(y * width + x)];
+                        *record = of_column(ends, scale, many);
+                    }
+                }
                 let rows = ys.clone().map(|y| y * width + xs.start..y * width + xs.end);
                 *block = of_columns(surfaces, rows, common);
             }
         });
-        let mut levels = vec![Size { blocks, across, down }];
-        while levels.len() < LEVELS as usize {
-            let above = levels[levels.len() - 1].grouped();
-            levels.push(above);
+        let columns = Places { first: [0; _], across: [across as i32; _] };
+        let mut all = Self { records, many, places: [columns; 2], scale, level };
+        let mut size = Size { blocks, across, down };
+        for level in 1..=LEVELS as usize {
+            let above = size.grouped();
+            for (places, record) in [Block::outside_record, Block::inside_record].iter().enumerate()
+            {
+                let places = &mut all.places[places];
+                places.first[level] = all.records.len() as i32;
+                places.across[level] = above.across as i32;
+                let end = all.records.len() + above.blocks.len() * PARTS;
+                all.records.resize(end, [0; 2]);
+                for (i, block) in size.blocks.iter().enumerate() {
+                    let [x, y] = [i % size.across, i / size.across];
+                    let place = (y / EDGE * above.across + x / EDGE) * PARTS;
+                    let place = place + y % EDGE * EDGE + x % EDGE;
+                    all.records[places.first[level] as usize + place] = record(block, scale);
+                }
+            }
+            size = above;
         }
-        Self { levels, level }
+        all
     }
+}
 
+impl Blocks {
     /// Whether a ray inside the liquid or not meets nothing in the block of the level that a pixel is in,
     /// between two values of nearness, the lower one first.
     #[inline(always)]
@@ -134,16 +208,60 @@ impl Blocks {
         [x, y]: [i32; 2],
         range: [f32; 2],
     ) -> bool {
-        let (of, shift) = (&self.levels[level as usize - 1], 2 * level);
-        let block = &of.blocks[(y >> shift) as usize * of.across + (x >> shift) as usize];
+        let Places { first, across } = &self.places[usize::from(INSIDE)];
+        let (x, y) = (x >> (2 * level), y >> (2 * level));
+        let block = (y >> 2) * across[level as usize] + (x >> 2);
+        let part = first[level as usize] + block * PARTS as i32 + (y & 3) * EDGE as i32 + (x & 3);
+        let words = self.records[part as usize];
+        let [a, b] = words.map(|word| word & 0xffff);
+        let [d, c] = words.map(|word| word >> 16);
+        let [low, high] = range.map(|nearness| whole(nearness, self.scale));
         match INSIDE {
-            true => block.inside.holds(range),
-            false => {
-                let [low, high] = range;
-                block.before < low || block.behind > high || block.between.holds(range)
-            }
+            true => b < low && high < a,
+            false => a < low || high < d || c < low && high < b,
         }
     }
+}
+
+/// Nearness as a whole number; infinite nearness is less or more than all other.
+#[inline(always)]
+fn whole(nearness: f32, [zero, per_unit]: [f32; 2]) -> u32 {
+    match nearness {
+        f32::INFINITY => ENDS[1] as u32 + 1,
+        f32::NEG_INFINITY => ENDS[0] as u32 - 1,
+        _ => (((nearness - zero) * per_unit) as i32 + ENDS[0]).clamp(ENDS[0], ENDS[1]) as u32,
+    }
+}
+
+/// The record of a column.
+#[inline(always)]
+fn of_column(ends: &[f32], scale: [f32; 2], many: &mut Vec<Many>) -> [u32; 2] {
+    let (&[a, b, ..], &[.., d]) = (ends, ends) else {
+        return [0; 2];
+    };
+    if !ends.is_sorted_by(|near, far| near >= far) {
+        // Where smoothing has turned a span inside out, nothing is known.
+        return [(ENDS[1] as u32 + 1) | (1 << 16), u32::MAX];
+    }
+    let [a, b, d] = [a, b, d].map(|nearness| whole(nearness, scale));
+    if ends.len() > 4 {
+        let mut all = [0; 16];
+        for (to, nearness) in all.iter_mut().zip(ends) {
+            *to = whole(*nearness, scale) as u16;
+        }
+        // Of more than there is room for, nothing is known.
+        let place = if ends.len() <= all.len() { many.len() as u32 } else { u32::MAX };
+        many.extend((place != u32::MAX).then_some(all));
+        return [a | ((d - 1) | 1) << 16, place];
+    }
+    let c = ends.get(2).map_or(b, |nearness| whole(*nearness, scale));
+    record([a, b, c, d])
+}
+
+/// A record without a place.
+#[inline(always)]
+fn record([a, b, c, d]: [u32; 4]) -> [u32; 2] {
+    [a | (d & !1) << 16, b | c << 16]
 }
 
 /// What some columns, given row by row, have in common.

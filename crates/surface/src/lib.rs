@@ -8,7 +8,7 @@
 //! - [`mod@connect`]: which of their ends are one surface
 //! - [`mod@filter`], [`mod@recursion`], [`mod@flow`]: surfaces made smooth; [`mod@normals`]
 //! - [`Surfaces::cut`]: what sections leave of them
-//! - [`shade()`]: pictures, with rays that [`mod@march`] through columns
+//! - [`shade()`]: pictures, with rays that [`mod@march`] through columns, in [`mod@packet`]s
 //!
 //! [`mod@reference`] is the definition of spans, by brute force in f64; for tests.
 //!
@@ -32,6 +32,7 @@ pub mod march;
 mod media;
 pub mod normals;
 mod occlusion;
+pub mod packet;
 mod params;
 pub mod recursion;
 pub mod reference;

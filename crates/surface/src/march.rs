@@ -45,26 +45,26 @@ pub struct Hit {
 
 /// A ray as a line over the picture.
 #[derive(Clone, Copy, Debug)]
-struct Line {
-    x: Axis,
-    y: Axis,
+pub(crate) struct Line {
+    pub x: Axis,
+    pub y: Axis,
     /// Nearness at its start, and its change to its end.
-    start: f32,
-    change: f32,
+    pub start: f32,
+    pub change: f32,
 }
 
 /// A line along one axis of the picture.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+pub(crate) struct Axis {
     /// Its place at its start, and its change to its end.
-    start: f32,
-    change: f32,
+    pub start: f32,
+    pub change: f32,
     /// What the way along the line grows by over a pixel; 0 if it stays in its pixel.
-    per_pixel: f32,
+    pub per_pixel: f32,
     /// Then infinite, else 0.
-    never: f32,
+    pub never: f32,
     /// 1 if pixels go up, else 0.
-    up: i32,
+    pub up: i32,
 }
 
 /// Lines shorter than this many pixels stay in their column.
@@ -139,7 +139,7 @@ impl Axis {
 impl Line {
     /// The part of `ray` between the near and the far plane.
     #[inline(always)]
-    fn new(surfaces: &Surfaces, ray: &Ray) -> Option<Self> {
+    pub fn new(surfaces: &Surfaces, ray: &Ray) -> Option<Self> {
         let view = &surfaces.view;
         let rays = &view.rays;
         let scale = 1.0 / rays.pixel;
@@ -244,12 +244,9 @@ fn walk<const INSIDE: bool>(
             }
         } else {
             count += 1;
-            let first = count == 1;
-            if first || !walk.passes_by::<INSIDE>([x, y], range) {
-                let hit = walk.column([x, y], ([u, end], before), first);
-                if hit.is_some() {
-                    return (hit, count);
-                }
+            let hit = walk.look_into::<INSIDE>([x, y], ([u, end], before), count == 1);
+            if hit.is_some() {
+                return (hit, count);
             }
         }
         if wall >= 1.0 {
@@ -284,10 +281,10 @@ fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-struct Walk<'a> {
-    surfaces: &'a Surfaces,
-    ray: &'a Ray,
-    line: Line,
+pub(crate) struct Walk<'a> {
+    pub surfaces: &'a Surfaces,
+    pub ray: &'a Ray,
+    pub line: Line,
 }
 
 /// The surfaces of a column: the first one's number, and their nearness.
@@ -307,6 +304,21 @@ impl<'a> Walk<'a> {
             }
         }
         !INSIDE
+    }
+
+    /// As `column`, unless it is plain that there is nothing.
+    #[inline(always)]
+    pub fn look_into<const INSIDE: bool>(
+        &self,
+        pixel: [i32; 2],
+        (way, before): ([f32; 2], Option<[i32; 2]>),
+        first: bool,
+    ) -> Option<Hit> {
+        let [a, b] = way.map(|u| self.line.nearness(u));
+        if !first && self.passes_by::<INSIDE>(pixel, [lesser(a, b), greater(a, b)]) {
+            return None;
+        }
+        self.column(pixel, (way, before), first)
     }
 
     /// What is met in a column, between two places of the line. The column `before` is the last one.

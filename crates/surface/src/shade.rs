@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::media::{MOST_MEDIA, Medium, Passage};
 use crate::occlusion::Occlusion;
-use crate::refract::Paths;
+use crate::refract::{MANY, Paths};
 use crate::shadow::Shadow;
 use crate::{Blocks, NO_CAP, Spans, Surfaces};
 
@@ -283,6 +283,9 @@ impl Paths<'_> {
             (_, Mode::Refractive) => self.pixel(&pixel),
         };
         row[to] = (Vec4::from_array(row[to]) + light * share).to_array();
+        if self.paths.len() >= MANY {
+            self.follow_all();
+        }
         if self.waiting.len() + self.later.sights.len() >= TOGETHER {
             self.settle(row);
         }
@@ -295,6 +298,7 @@ impl Paths<'_> {
 
     /// Adds to a row what is still to be looked up.
     fn finish(&mut self, row: &mut [[f32; 4]]) -> Work {
+        self.follow_all();
         self.settle(row);
         self.work
     }

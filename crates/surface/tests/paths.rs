@@ -4,6 +4,7 @@ use fearless_simd::Level;
 use glam::{DVec3, Vec3};
 use motes_scene::{Beyond, Lights, Projection, Rays, Scene, Sight, optics};
 use motes_surface::march::{Ray, march, march_blocks};
+use motes_surface::packet::march_together;
 use motes_surface::reference::{Sphere, voxelize};
 use motes_surface::{Around, Blocks, Medium, Mode, Optics, Smoothing, Surfaces, View, shade};
 
@@ -130,6 +131,7 @@ fn blocks_change_no_hit() {
             Surfaces::new(spans, view, Smoothing { radius: 0.01, ..Smoothing::NONE }, Level::new());
         let blocks = Blocks::new(Level::new(), &surfaces);
         let (mut hits, mut plain, mut skipped) = (0, 0, 0);
+        let (mut rays, mut expected) = (Vec::new(), Vec::new());
         for i in 0..40_000_u32 {
             let pixel = (i * 7919) as usize % view.pixels();
             let of = surfaces.of(pixel);
@@ -148,10 +150,20 @@ fn blocks_change_no_hit() {
             let ((a, all), (b, some)) =
                 (march(&surfaces, &ray), march_blocks((&surfaces, &blocks), &ray));
             assert_eq!(a, b, "{projection:?}: {ray:?}");
+            rays.push(ray);
+            expected.push(a);
             (hits, plain, skipped) =
                 (hits + u32::from(a.is_some()), plain + all, skipped + all - some.min(all));
         }
         assert!(hits > 3000 && skipped > plain / 4, "{hits} hits, {skipped} of {plain} skipped");
+        let mut found = Vec::new();
+        for count in [1, 15, 700, rays.len()] {
+            march_together((&surfaces, &blocks), &rays[..count], &mut found);
+            for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                assert_eq!(found, expected, "{projection:?}, {count}: {:?}", rays[i]);
+            }
+            assert_eq!(found.len(), count);
+        }
     }
 }
 
