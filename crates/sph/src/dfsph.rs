@@ -4,8 +4,8 @@
 //!
 //! With ∇W = −C t d (see [`crate::kernel`]; lengths in supports) and s = Δt p/ρ², the pressures' work on the velocities is
 //! v_i += m C Σ_j t (s_i + s_j) d, which changes the rate of density of i itself, per s_i, by
-//! −(m C)² (G·(G + G_w) + Σ t² r²), G = Σ t d and G_w its part by walls: their factor α (Eq. 8–11). Each iteration (Alg. 3, 4) is one of Jacobi's:
-//! s_i += ω R_i / (m C)² (…), with [`Momentum`]; R is the rate to be got rid of:
+//! −(m C)² (G·(G + G_w) + Σ t² r²), G = Σ t d and G_w its part by walls: their factor α (Eq. 8–11). Each iteration (Alg. 3, 4)
+//! is s_i = max(s_i + ω R_i / (m C)² (…), 0), where R is the rate to be got rid of:
 //!
 //! | solver | R | what it changes |
 //! |---|---|---|
@@ -13,31 +13,31 @@
 //! | place | dρ/dt + (ρ − ρ₀)/Δt | how particles move in this step |
 //!
 //! In the paper both change the velocities. What is done against a density that is already too great would
-//! then stay as speed, and energy come from nothing; here it moves the particles and is forgotten. And what
-//! is still too thin may become denser, as far as ρ₀: spray falls together again.
+//! then stay as speed, and energy come from nothing; were it all forgotten, particles that approach would do
+//! so step after step, and long steps end in pairs. [`KEPT`] of it stays. And what is still too thin may become denser, as
+//! far as ρ₀: spray falls together again.
 //!
-//! Pressure is kept from pulling (s ≥ 0) as a whole rather than iteration by iteration, so that a start with
-//! the last step's can be taken back where it was too much.
+//! The paper's ω is ½. To find the s is to find the least of ½ s·A s − s·R over s ≥ 0, A being what pressures
+//! do to rates: projected gradients, for which [`Stride`] tells ω from how the last iteration turned out. A start with
+//! the last step's pressures is taken as far as it brings that sum down, so that it cannot add energy.
 
 use rayon::prelude::*;
 
 use crate::Simulation;
-use crate::fluid::{CHUNK, Fluid};
+use crate::fluid::{CHUNK, Fluid, total};
 use crate::kernel::Wendland;
 use crate::passes::{Divergence, Drag, Factors, Push};
 use crate::simulation::{Around, Greatest, Physics};
 use crate::wcsph::accelerate;
 
-/// ω: neighbours correct at the same time, and with momentum (0.5 is too much for that).
-const RELAXATION: f32 = 0.3;
+/// ω to begin with, and at which errors are told.
+const FIRST: f32 = 0.5;
+/// What it may become.
+const STRIDES: (f64, f64) = (0.1, 3.0);
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
-/// The part of the places' last pressure that velocities begin with as well: what had to be put right there
-/// is what velocities were not stopped from, and few iterations do if it is not forgotten step after step.
-/// The second where the last step's velocities were left with an error of [`FEEDBACK_FROM`] or more; as
-/// large a part at all times would set liquid at rest swinging.
-const FEEDBACK: [f32; 2] = [0.1, 0.5];
-const FEEDBACK_FROM: f64 = 0.001;
+/// The part of what moves particles to their places that stays as velocity.
+const KEPT: f32 = 0.3;
 
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
@@ -59,12 +59,9 @@ impl Simulation {
         // By rate, not by step: what is left over in each of many short steps would add up.
         let share = f64::from(secs) / self.longest_step();
         let tolerance = VELOCITY * share.min(1.0) * self.physics.sph.tolerance;
-        let feedback = FEEDBACK[usize::from(self.unsolved)];
         let (around, fluid, physics, stats) = self.parts();
         factors(around, fluid, physics);
         let acceleration = forces(around, fluid, physics, secs);
-        let [velocity, place] = &mut fluid.warm;
-        velocity.iter_mut().zip(place).for_each(|(v, p)| *v += feedback * *p);
         let first = solve(Aim::Velocity, around, fluid, physics, (secs, tolerance));
         for (row, velocity) in fluid.motion.iter_mut().zip(&fluid.velocity) {
             row.clone_from(velocity);
@@ -73,8 +70,13 @@ impl Simulation {
             solve(Aim::Place, around, fluid, physics, (secs, PLACE * physics.sph.tolerance));
         stats.iterations = [stats.iterations[0] + first.0, stats.iterations[1] + second.0];
         stats.compression = second.1;
+        for (velocity, motion) in fluid.velocity.iter_mut().zip(&fluid.motion) {
+            let rows = velocity.par_chunks_mut(CHUNK).zip(motion.par_chunks(CHUNK));
+            rows.for_each(|(velocity, motion)| {
+                velocity.iter_mut().zip(motion).for_each(|(v, m)| *v += KEPT * (m - *v));
+            });
+        }
         let greatest = Self::move_on(fluid, physics, secs);
-        self.unsolved = first.1 > VELOCITY * share.min(1.0) * FEEDBACK_FROM;
         Greatest { acceleration, ..greatest }
     }
 }
@@ -86,6 +88,11 @@ impl Fluid {
             Aim::Velocity => &mut self.velocity,
             Aim::Place => &mut self.motion,
         }
+    }
+
+    /// The pressure that changed the velocity of a particle in the last step, pascals.
+    pub fn pressure_felt(&self, at: usize) -> f32 {
+        self.warm[0][at] + KEPT * self.warm[1][at]
     }
 }
 
@@ -130,22 +137,14 @@ fn forces(around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) -
     greatest
 }
 
-/// Nesterov's momentum: each iteration goes on by a part of the way that the last one went, more and more,
-/// and begins anew when the error has grown (Nesterov 1983; O'Donoghue & Candès 2015).
-struct Momentum {
-    since: u32,
-    error: f64,
-}
-
-impl Momentum {
-    fn momentum(&self) -> f32 {
-        self.since as f32 / (self.since as f32 + 3.0)
-    }
-
-    fn seen(&mut self, error: f64) {
-        self.since = if error > self.error { 0 } else { self.since + 1 };
-        self.error = error;
-    }
+/// ω by the step of Barzilai & Borwein 1988 (for bounds: Birgin, Martínez & Raydan 2000): with Δs and ΔR of
+/// the last iteration, and D = 1/((m C)² (…)), ω = Δs·D⁻¹Δs / −Δs·ΔR. That is by which it would have got rid of
+/// most, in those s that it changed.
+struct Stride {
+    /// ω.
+    omega: f32,
+    /// Whether an iteration has been.
+    seen: bool,
 }
 
 /// One of the two solvers: how many iterations, and the mean error that is left.
@@ -158,29 +157,18 @@ fn solve(
 ) -> (u64, f64) {
     let n = fluid.count;
     let unit = secs / (physics.density * physics.density);
-    // Pascals become s, and are tried.
-    let (warm, s) = (&mut fluid.warm[aim as usize], &mut fluid.pressure);
-    let rows = warm[..n].par_chunks_mut(CHUNK).zip(s[..n].par_chunks_mut(CHUNK));
-    rows.for_each(|(total, s)| {
-        for (total, s) in total.iter_mut().zip(s) {
-            *total *= WARM * unit;
-            *s = *total;
-        }
-    });
-    push(aim, around, fluid, physics);
-    let Fluid { before, warm, .. } = fluid;
-    before.clone_from(&warm[aim as usize]);
+    begin(aim, around, fluid, physics, secs);
     let mut iterations = 0;
-    let mut compression;
-    let mut way = Momentum { since: 0, error: f64::INFINITY };
+    let mut error;
+    let mut stride = Stride { omega: FIRST, seen: false };
     loop {
-        compression = correct(aim, around, fluid, physics, (secs, way.momentum()));
-        way.seen(compression);
-        let enough = iterations >= LEAST && compression <= tolerance;
+        error = correct(aim, around, fluid, physics, (secs, &mut stride));
+        let enough = iterations >= LEAST && error <= tolerance;
         if enough || iterations >= u64::from(physics.sph.iterations) {
             break;
         }
-        push(aim, around, fluid, physics);
+        push(around, fluid, physics);
+        pushed(aim, fluid, physics, 1.0);
         iterations += 1;
     }
     // What was found last has not been tried.
@@ -188,7 +176,40 @@ fn solve(
     total[..n].par_chunks_mut(CHUNK).zip(s[..n].par_chunks(CHUNK)).for_each(|(total, s)| {
         total.iter_mut().zip(s).for_each(|(total, s)| *total = (*total - s) / unit);
     });
-    (iterations, compression)
+    (iterations, error)
+}
+
+/// Begins with the last step's pressures, as far as they are of use: to α = s·R / s·A s, no more than 1. That is told
+/// from what they do to velocities v: s·A s = Σ Δv², and s·dρ/dt = −Σ v·Δv.
+fn begin(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics, secs: f32) {
+    let n = fluid.count;
+    // Pascals become s.
+    let unit = secs / (physics.density * physics.density);
+    let (warm, s) = (&fluid.warm[aim as usize], &mut fluid.pressure);
+    let rows = warm[..n].par_chunks(CHUNK).zip(s[..n].par_chunks_mut(CHUNK));
+    rows.for_each(|(warm, s)| {
+        s.iter_mut().zip(warm).for_each(|(s, warm)| *s = WARM * unit * warm);
+    });
+    push(around, fluid, physics);
+    let scale = f64::from(physics.mass * physics.kernel.slope);
+    let rows = if aim == Aim::Velocity { &fluid.velocity } else { &fluid.motion };
+    let change = |i: usize, k: usize| scale * f64::from(fluid.sums[k][i]);
+    let needed = total(n, |i| {
+        let counted = counted(aim, fluid.density[i] - physics.density) / secs;
+        let along: f64 = (0..3).map(|k| f64::from(rows[k][i]) * change(i, k)).sum();
+        f64::from(fluid.pressure[i] * counted) - along
+    });
+    let done = total(n, |i| (0..3).map(|k| change(i, k).powi(2)).sum());
+    let part = if done > 0.0 { (needed / done).clamp(0.0, 1.0) as f32 } else { 0.0 };
+    pushed(aim, fluid, physics, part);
+    let (warm, s) = (&mut fluid.warm[aim as usize], &fluid.pressure);
+    let rows = warm[..n].par_chunks_mut(CHUNK).zip(s[..n].par_chunks(CHUNK));
+    rows.for_each(|(warm, s)| warm.iter_mut().zip(s).for_each(|(warm, s)| *warm = part * s));
+}
+
+/// What of ρ − ρ₀ is to be got rid of.
+fn counted(aim: Aim, excess: f32) -> f32 {
+    if aim == Aim::Place { excess } else { excess.min(0.0) }
 }
 
 /// Finds what is still to be pushed, and the mean error of the densities without it: too dense, or too
@@ -198,7 +219,7 @@ fn correct(
     around: Around<'_>,
     fluid: &mut Fluid,
     physics: &Physics,
-    (secs, momentum): (f32, f32),
+    (secs, stride): (f32, &mut Stride),
 ) -> f64 {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
@@ -208,45 +229,69 @@ fn correct(
     around.of(fluid, physics).sum(Divergence(Wendland), inputs, [&mut sum[..n]]);
     let slope = physics.mass * physics.kernel.slope;
     let rest = physics.density;
-    let parts: Vec<f64> = (
-        (
-            fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK),
-            fluid.before[..n].par_chunks_mut(CHUNK),
-        ),
-        fluid.pressure[..n].par_chunks_mut(CHUNK),
+    fluid.rate.resize(n, 0.0);
+    let parts: Vec<[f64; 2]> = (
+        fluid.rate.par_chunks_mut(CHUNK),
+        (fluid.pressure[..n].par_chunks(CHUNK), fluid.factor[..n].par_chunks(CHUNK)),
         (sum[..n].par_chunks(CHUNK), fluid.density[..n].par_chunks(CHUNK)),
-        fluid.factor[..n].par_chunks(CHUNK),
     )
         .into_par_iter()
-        .map(|((total, before), s, (sum, density), factor)| {
-            let mut excess = 0.0;
-            for i in 0..total.len() {
-                let excess_now = density[i] - rest;
-                let counted = if aim == Aim::Place { excess_now } else { excess_now.min(0.0) };
-                let rate = counted / secs - slope * sum[i];
-                let next = (total[i] + RELAXATION * rate * factor[i]).max(0.0);
-                let error = (next - total[i]) / (RELAXATION * factor[i]) * secs / rest;
-                excess += f64::from(error.abs());
-                let further = (next + momentum * (next - before[i])).max(0.0);
-                s[i] = further - total[i];
-                (before[i], total[i]) = (next, further);
+        .map(|(rates, (s, factor), (sum, density))| {
+            let [mut way, mut gone] = [0.0; 2];
+            for i in 0..rates.len() {
+                let rate = counted(aim, density[i] - rest) / secs - slope * sum[i];
+                way += f64::from(s[i] * s[i] / factor[i]);
+                gone += f64::from(s[i] * (rates[i] - rate));
+                rates[i] = rate;
             }
-            excess
+            [way, gone]
         })
         .collect();
     fluid.sums = sums;
+    let [way, gone] = parts.iter().fold([0.0; 2], |sum, part| [0, 1].map(|k| sum[k] + part[k]));
+    if stride.seen && gone > 0.0 {
+        stride.omega = (way / gone).clamp(STRIDES.0, STRIDES.1) as f32;
+    }
+    stride.seen = true;
+    let omega = stride.omega;
+    let parts: Vec<f64> = (
+        fluid.warm[aim as usize][..n].par_chunks_mut(CHUNK),
+        fluid.pressure[..n].par_chunks_mut(CHUNK),
+        fluid.rate.par_chunks(CHUNK),
+        fluid.factor[..n].par_chunks(CHUNK),
+    )
+        .into_par_iter()
+        .map(|(total, s, rate, factor)| {
+            let mut error = 0.0;
+            for i in 0..total.len() {
+                let by = rate[i] * factor[i];
+                let next = (total[i] + omega * by).max(0.0);
+                let tried = (total[i] + FIRST * by).max(0.0) - total[i];
+                error += f64::from((tried / (FIRST * factor[i]) * secs / rest).abs());
+                (s[i], total[i]) = (next - total[i], next);
+            }
+            error
+        })
+        .collect();
     parts.iter().sum::<f64>() / n.max(1) as f64
 }
 
-/// Lets what stands in [`Fluid::pressure`] push.
-fn push(aim: Aim, around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
+/// Leaves in the sums what would come of [`Fluid::pressure`].
+fn push(around: Around<'_>, fluid: &mut Fluid, physics: &Physics) {
     let n = fluid.count;
     let mut sums = std::mem::take(&mut fluid.sums);
     let [a, b, c, ..] = &mut sums;
     let outputs = [&mut a[..n], &mut b[..n], &mut c[..n]];
     around.of(fluid, physics).sum(Push(Wendland), [&fluid.pressure], outputs);
-    let scale = physics.mass * physics.kernel.slope;
-    for (row, sum) in fluid.aim(aim).iter_mut().zip([a, b, c]) {
+    fluid.sums = sums;
+}
+
+/// Lets a part of what [`push`] found be.
+fn pushed(aim: Aim, fluid: &mut Fluid, physics: &Physics, part: f32) {
+    let n = fluid.count;
+    let scale = part * physics.mass * physics.kernel.slope;
+    let sums = std::mem::take(&mut fluid.sums);
+    for (row, sum) in fluid.aim(aim).iter_mut().zip(&sums) {
         row[..n].par_chunks_mut(CHUNK).zip(sum[..n].par_chunks(CHUNK)).for_each(|(row, sum)| {
             row.iter_mut().zip(sum).for_each(|(v, sum)| *v += scale * sum);
         });

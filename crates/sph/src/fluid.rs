@@ -26,8 +26,8 @@ pub(crate) struct Fluid {
     /// What the last step's pressures were, to begin the next with, pascals: of velocities and of places
     /// ([`crate::dfsph`]).
     pub warm: [Vec<f32>; 2],
-    /// The iteration's pressures before its momentum ([`crate::dfsph`]).
-    pub before: Vec<f32>,
+    /// The rates of density that the last iteration met ([`crate::dfsph`]).
+    pub rate: Vec<f32>,
     /// The particle's number, in the order in which they came.
     pub id: Vec<u32>,
     /// Kilograms per cubic metre.

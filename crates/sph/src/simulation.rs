@@ -98,8 +98,6 @@ pub struct Simulation {
     walls: Walls,
     /// The most of v² and a² over the particles in the last step.
     pub(crate) greatest: Greatest,
-    /// Whether velocities were left with a large error ([`crate::dfsph`]).
-    pub(crate) unsolved: bool,
     jets: Vec<Spout>,
     most: usize,
     frames: u64,
@@ -189,7 +187,6 @@ impl Simulation {
         Self {
             stats: Stats { particles: fluid.count, ..Stats::default() },
             greatest: Greatest { speed, ..Greatest::default() },
-            unsolved: false,
             jets: spouts.collect(),
             most: setup.most,
             frames: 0,
@@ -403,12 +400,12 @@ impl Simulation {
         let (around, fluid, physics, stats) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
-        let (density, pressure) = (&sums[0][..n], &mut fluid.pressure);
+        let density = &sums[0][..n];
         let scale = physics.mass * physics.kernel.value;
-        for (at, pressure) in pressure[..n].iter_mut().enumerate() {
-            *pressure = match physics.sph.solver {
+        for at in 0..n {
+            fluid.pressure[at] = match physics.sph.solver {
                 Solver::Wcsph => physics.pressure_over_square(scale * (1.0 + density[at])),
-                Solver::Dfsph => fluid.warm[0][at] / (physics.density * physics.density),
+                Solver::Dfsph => fluid.pressure_felt(at) / (physics.density * physics.density),
             };
         }
         transmitted(around, fluid, physics, &mut sums[7][..n]);
