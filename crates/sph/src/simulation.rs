@@ -400,11 +400,10 @@ impl Simulation {
         let (around, fluid, physics, stats) = self.parts();
         let n = fluid.count;
         let mut sums = std::mem::take(&mut fluid.sums);
-        let density = &sums[0][..n];
         let scale = physics.mass * physics.kernel.value;
-        for at in 0..n {
+        for (at, density) in sums[0][..n].iter().enumerate() {
             fluid.pressure[at] = match physics.sph.solver {
-                Solver::Wcsph => physics.pressure_over_square(scale * (1.0 + density[at])),
+                Solver::Wcsph => physics.pressure_over_square(scale * (1.0 + density)),
                 Solver::Dfsph => fluid.pressure_felt(at) / (physics.density * physics.density),
             };
         }
