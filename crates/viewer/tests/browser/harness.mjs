@@ -111,8 +111,9 @@ function words(page) {
       // A picture from before the window had its size does not count.
       const sized = await canvas.evaluate((c) => Math.abs(c.width - c.clientWidth * devicePixelRatio) < 1);
       if (!sized) return '';
-      const [exactly, hash] = [await canvas.getAttribute('data-exact'), await canvas.getAttribute('data-hash')];
+      // In this order: a hash that is read before its state may be that of the picture before.
       const [state, idle] = [Number(await canvas.getAttribute('data-state')), await store('!store.pending && store.inFlight === 0 && store.state')];
+      const [exactly, hash] = [await canvas.getAttribute('data-exact'), await canvas.getAttribute('data-hash')];
       return exactly === 'true' && idle !== false && state === idle ? hash : '';
     };
     return until(rested, 'an exact picture');
