@@ -186,7 +186,8 @@ impl Chunk {
         cells.clear();
         found.clear();
         let (shift, row) = (tiles.edge.trailing_zeros(), tiles.dims[0] as u32);
-        let (within, across) = (tiles.edge as u32 - 1, lattice.dims[0] as u32);
+        let [across, rows, _] = lattice.dims.map(|n| n as u32);
+        let (edge, within) = (tiles.edge as u32, tiles.edge as u32 - 1);
         // They are inside, but for what coordinates far from 0 are rounded by.
         let last = Vec3::from_array(lattice.cells().map(|n| (n - 1) as f32));
         let mut run = Run::default();
@@ -204,7 +205,9 @@ impl Chunk {
             }
             run.end += 1;
             entries.push(Entry { at, index: index as u32 });
-            cells.push((((z & within) << shift) + (y & within)) * across + x);
+            // The last tiles have fewer rows.
+            let wide = edge.min(rows - (y & !within));
+            cells.push(((z & within) * wide + (y & within)) * across + x);
         }
         found.push(run);
     }
