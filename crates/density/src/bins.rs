@@ -16,6 +16,8 @@ use crate::params::Particles;
 /// Particles in a chunk, at the least, and chunks at the most: each knows where all tiles begin.
 const LEAST_CHUNK: usize = 1 << 11;
 const MOST_CHUNKS: usize = 64;
+/// Greater radii are left out: what they reach would be no number of single precision.
+const MOST_RADIUS: f32 = 1e36;
 /// Particles that are worth a look of their own.
 const SURVEYED: usize = 1 << 12;
 
@@ -142,7 +144,7 @@ impl Survey {
 }
 
 fn drawable(point: Vec3, radius: f32) -> bool {
-    point.is_finite() && radius > 0.0 && radius.is_finite()
+    point.is_finite() && radius > 0.0 && radius <= MOST_RADIUS
 }
 
 impl Bins {

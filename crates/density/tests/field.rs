@@ -65,6 +65,21 @@ fn radii_of_all_sizes_are_added_up_in_a_cell() {
 }
 
 #[test]
+fn what_is_out_of_all_proportion_ends() {
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0]];
+    for radius in [1e35, 1e38, f32::MAX] {
+        let radii = [radius, 0.5];
+        let each = Particles { positions: &positions, radii: Radii::Each(&radii), masks: None };
+        for voxel in [3e34, 1e38, f32::INFINITY] {
+            let found = field(&each, &plain(voxel));
+            let number = if radius < 1e36 { 2 } else { 1 };
+            assert_eq!(found.counts.particles, number, "{radius} {voxel}");
+            assert!(found.values.iter().all(|v| v.is_finite()), "{radius} {voxel}");
+        }
+    }
+}
+
+#[test]
 fn a_liquid_at_rest_has_a_density_of_one() {
     let positions: Vec<[f32; 3]> =
         (0..20 * 20 * 20).map(|i| [i % 20, i / 20 % 20, i / 400].map(|v| v as f32 * 0.1)).collect();
