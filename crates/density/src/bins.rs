@@ -16,6 +16,8 @@ use crate::params::Particles;
 /// Particles in a chunk, at the least, and chunks at the most: each knows where all tiles begin.
 const LEAST_CHUNK: usize = 1 << 11;
 const MOST_CHUNKS: usize = 64;
+/// Greater radii are left out: what they reach would be no number of single precision.
+const MOST_RADIUS: f32 = 1e36;
 /// Particles that are worth a look of their own.
 const SURVEYED: usize = 1 << 12;
 
@@ -142,7 +144,7 @@ impl Survey {
 }
 
 fn drawable(point: Vec3, radius: f32) -> bool {
-    point.is_finite() && radius > 0.0 && radius.is_finite()
+    point.is_finite() && radius > 0.0 && radius <= MOST_RADIUS
 }
 
 impl Bins {
@@ -186,7 +188,8 @@ impl Chunk {
         cells.clear();
         found.clear();
         let (shift, row) = (tiles.edge.trailing_zeros(), tiles.dims[0] as u32);
-        let (within, across) = (tiles.edge as u32 - 1, lattice.dims[0] as u32);
+        let [across, rows, _] = lattice.dims.map(|n| n as u32);
+        let (edge, within) = (tiles.edge as u32, tiles.edge as u32 - 1);
         // They are inside, but for what coordinates far from 0 are rounded by.
         let last = Vec3::from_array(lattice.cells().map(|n| (n - 1) as f32));
         let mut run = Run::default();
@@ -204,7 +207,9 @@ impl Chunk {
             }
             run.end += 1;
             entries.push(Entry { at, index: index as u32 });
-            cells.push((((z & within) << shift) + (y & within)) * across + x);
+            // The last tiles have fewer rows.
+            let wide = edge.min(rows - (y & !within));
+            cells.push(((z & within) * wide + (y & within)) * across + x);
         }
         found.push(run);
     }

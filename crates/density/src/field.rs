@@ -14,6 +14,7 @@ use crate::rough::{self, Rough};
 const TILE: usize = 4;
 /// Edge of a voxel in mean radii, at the least: finer ones would show nothing more.
 const LEAST_VOXEL: f32 = 0.25;
+
 /// What was done for a field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -80,7 +81,7 @@ impl Field {
         // Their memory is kept.
         desks.resize_with(bins.tiles.count(), Desk::default);
         desks.par_iter_mut().enumerate().with_max_len(1).for_each(|(tile, desk)| {
-            desk.sort(bins.of(tile), (&lattice, edge), bins.tiles.first(tile));
+            desk.sort(bins.of(tile), (&lattice, bins.tiles), bins.tiles.first(tile));
         });
         if params.rough {
             self.rough.fill((desks, bins.tiles, particles), &lattice, (rough_edge, far));

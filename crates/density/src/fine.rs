@@ -17,7 +17,7 @@ use fearless_simd::{f32x4, f32x8, f32x16, prelude::*};
 use fearless_simd_macros::simd;
 use motes_grid::Radii;
 
-use crate::bins::{Entry, sort};
+use crate::bins::{Entry, Tiles, sort};
 use crate::kernel::height;
 use crate::lanes::LANES;
 use crate::lattice::{Lattice, reach};
@@ -32,6 +32,8 @@ const LEAST_REACH: f32 = 1.7;
 pub(crate) const WIDE: usize = 8;
 /// Nodes of a block along z at the most.
 const HIGH: usize = 8;
+/// Particles of a cell that are added up together at the most: there is room for so many.
+const MOST_TOGETHER: usize = 1 << 10;
 
 /// What densities are made from.
 #[derive(Clone, Copy)]
@@ -64,10 +66,10 @@ pub(crate) struct Desk {
     /// Entries and their cells, before they are sorted.
     unsorted: Vec<Entry>,
     keys: Vec<u32>,
-    /// First cell, along y and z, cells along x, and along y as along z.
+    /// First cell, along y and z, cells along x, and along y and z.
     first: [usize; 2],
     across: usize,
-    edge: usize,
+    wide: [usize; 2],
     /// Those of one cell.
     bumps: Vec<Bump>,
     /// Voxels written.
@@ -95,9 +97,17 @@ struct Bump {
     steep: [[f32; 2]; 3],
     /// What is taken from the height at the nodes along z of a block.
     down: [f32; HIGH],
+    /// It reaches nodes less than so many from its cell.
+    half: u32,
 }
 
 impl Bump {
+    /// Those of one class are added up together: of others, small ones would go through all that large ones reach.
+    #[inline(always)]
+    fn class(&self) -> u32 {
+        self.half.max(4).ilog2()
+    }
+
     /// Looks at the nodes from `first` on, counted from that of the cell.
     #[inline(always)]
     fn look_down<S: Simd, const MASKED: bool>(&mut self, simd: S, first: f32) {
@@ -135,9 +145,9 @@ impl<'a> Source<'a> {
         Spread { reach, height, steep: height / (reach * reach) }
     }
 
-    /// The density of a particle in a cell, and its greatest reach.
+    /// The density of a particle in a cell.
     #[inline(always)]
-    fn bump<const MASKED: bool>(&self, entry: &Entry, cell: [f32; 3]) -> (Bump, f32) {
+    fn bump<const MASKED: bool>(&self, entry: &Entry, cell: [f32; 3]) -> Bump {
         let index = entry.index as usize;
         let spread = match self.uniform {
             Some(same) => same,
@@ -146,7 +156,7 @@ impl<'a> Source<'a> {
         let Spread { reach: far, height, steep } = spread;
         let [x, y, z] = entry.at;
         let at = [x - cell[0], y - cell[1], z - cell[2]];
-        let mut bump = Bump { at, height, steep: [[steep; 2]; 3], down: [0.0; HIGH] };
+        let mut bump = Bump { at, height, steep: [[steep; 2]; 3], ..Bump::default() };
         let mut greatest = far;
         if MASKED && let Some(masks) = self.particles.masks {
             let (mask, least) = (&masks[index], LEAST_REACH.min(far));
@@ -170,7 +180,8 @@ impl<'a> Source<'a> {
                 }
             }
         }
-        (bump, greatest)
+        bump.half = greatest.ceil() as u32;
+        bump
     }
 }
 
@@ -180,10 +191,11 @@ impl Desk {
     pub fn sort<'a>(
         &mut self,
         parts: impl Iterator<Item = (&'a [Entry], &'a [u32])> + Clone,
-        (lattice, edge): (&Lattice, usize),
+        (lattice, tiles): (&Lattice, Tiles),
         first: [usize; 2],
     ) {
-        (self.first, self.across, self.edge) = (first, lattice.dims[0], edge);
+        (self.first, self.across) = (first, lattice.dims[0]);
+        self.wide = [0, 1].map(|a| tiles.edge.min(lattice.dims[a + 1] - first[a]));
         let (entries, unsorted, cells) = (&mut self.entries, &mut self.unsorted, &mut self.keys);
         unsorted.clear();
         cells.clear();
@@ -192,7 +204,8 @@ impl Desk {
             cells.extend_from_slice(own);
         }
         entries.resize(cells.len(), Entry::default());
-        let count = if cells.is_empty() { 0 } else { edge * edge * lattice.dims[0] };
+        let all = self.across * self.wide[0] * self.wide[1];
+        let count = if cells.is_empty() { 0 } else { all };
         let from = cells.iter().copied().zip(unsorted.iter().copied());
         sort(&mut self.starts, count, from, entries);
     }
@@ -201,8 +214,9 @@ impl Desk {
     #[inline(always)]
     pub fn rows(&self) -> impl Iterator<Item = Cells<'_>> {
         let starts = self.starts.windows(self.across + 1).step_by(self.across.max(1));
-        let place = |row: usize| [self.first[0] + row % self.edge, self.first[1] + row / self.edge];
-        let rows = starts.take(self.edge * self.edge).enumerate();
+        let [along, beside] = self.wide;
+        let place = move |row: usize| [self.first[0] + row % along, self.first[1] + row / along];
+        let rows = starts.take(along * beside).enumerate();
         rows.filter(|(_, starts)| starts[0] < starts[starts.len() - 1])
             .map(move |(row, starts)| Cells { at: place(row), starts, entries: &self.entries })
     }
@@ -248,23 +262,43 @@ pub(crate) fn add<S: Simd, const MASKED: bool, const SATURATES: bool, const COUN
             }
             visits += own.len() as u64;
             let corner = [cell[0] as f32, cell[1] as f32, cell[2] as f32];
-            let mut far = 0.0_f32;
-            bumps.clear();
-            for entry in own {
-                let (bump, reach) = source.bump::<MASKED>(entry, corner);
-                bumps.push(bump);
-                far = far.max(reach);
+            for own in own.chunks(MOST_TOGETHER) {
+                bumps.clear();
+                for entry in own {
+                    bumps.push(source.bump::<MASKED>(entry, corner));
+                }
+                if source.uniform.is_none() {
+                    bumps.sort_by_key(Bump::class);
+                }
+                for some in bumps.chunk_by_mut(|a, b| a.class() == b.class()) {
+                    let made = (some, cell);
+                    let limit = source.params.saturation;
+                    updates += of_cell::<S, MASKED, SATURATES, COUNTED>(simd, made, limit, rows);
+                }
             }
-            let made = (&mut bumps[..], cell);
-            let near = (far.ceil() as usize, source.params.saturation);
-            updates += match near.0 {
-                ..=2 => in_blocks::<S, 4, 4, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
-                3 => in_blocks::<S, 8, 6, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
-                _ => in_blocks::<S, 8, 8, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
-            };
         }
     }
     (desk.bumps, desk.visits, desk.updates) = (bumps, visits, updates);
+}
+
+/// Adds the densities of particles of a cell to the nodes that they reach; how many are written, if counted.
+#[inline(always)]
+fn of_cell<S: Simd, const MASKED: bool, const SATURATES: bool, const COUNTED: bool>(
+    simd: S,
+    made: (&mut [Bump], [usize; 3]),
+    limit: f32,
+    rows: &mut Rows<'_>,
+) -> u64 {
+    let mut half = 0;
+    for bump in &*made.0 {
+        half = bump.half.max(half);
+    }
+    let near = (half as usize, limit);
+    match half {
+        ..=2 => in_blocks::<S, 4, 4, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
+        3 => in_blocks::<S, 8, 6, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
+        _ => in_blocks::<S, 8, 8, MASKED, SATURATES, COUNTED>(simd, made, near, rows),
+    }
 }
 
 /// Adds the densities of a cell's particles, block by block, to all nodes less than `half` from it; how many are
@@ -293,7 +327,6 @@ fn in_blocks<
         }
         for y in (0..nodes).step_by(LANES / X) {
             for x in (0..nodes).step_by(X) {
-                // The density of a particle ends within the lattice.
                 let at = [begin[0] + x, begin[1] + y, begin[2] + z];
                 let from = [first + x as i32, first + y as i32, first + z as i32];
                 let mut open = [0xffff; Z];

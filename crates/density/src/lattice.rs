@@ -11,6 +11,8 @@ use crate::params::Params;
 const MOST_NODES: f64 = (1 << 27) as f64;
 /// Nodes along an axis at the most: positions have to be told apart by a few ten-thousandths of a voxel.
 const MOST_ALONG: f64 = 2048.0;
+/// Edge of a voxel at the most: what is reached is a number of single precision.
+const MOST_VOXEL: f32 = 1e36;
 /// Nodes without density at each side, for gradients.
 const RIM: f32 = 2.0;
 /// Least reach of a particle, in voxels: it meets several nodes wherever it is.
@@ -37,7 +39,7 @@ impl Lattice {
     /// Covers particles with centres in `low..high` and radii up to `radius`. Nodes lie at whole voxels from
     /// the origin, so that a liquid at rest looks the same wherever others go.
     pub fn new((low, high): (Vec3, Vec3), radius: f32, params: &Params) -> Self {
-        let mut voxel = params.voxel.max(f32::MIN_POSITIVE);
+        let mut voxel = params.voxel.clamp(f32::MIN_POSITIVE, MOST_VOXEL);
         loop {
             let pad = reach(radius, voxel, params).max(params.drop * radius);
             let lattice = Self::with_voxel((low, high), voxel, pad);

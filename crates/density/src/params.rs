@@ -6,7 +6,8 @@ use motes_grid::Radii;
 /// §4.2.2).
 pub type Mask = [f32; 6];
 
-/// The particles of a liquid, in any order. Those without a finite position or a positive radius are left out.
+/// The particles of a liquid, in any order. Those without a finite position or a positive
+/// radius of at most 10³⁶ are left out.
 #[derive(Clone, Copy, Debug)]
 pub struct Particles<'a> {
     /// Centres.

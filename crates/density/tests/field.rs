@@ -44,6 +44,42 @@ fn the_plain_field_is_the_definition() {
 }
 
 #[test]
+fn radii_of_all_sizes_are_added_up_in_a_cell() {
+    // A large one among many small ones, more than are added up together.
+    let mut positions = vec![[0.507, 0.503, 0.509]; 1500];
+    let mut radii = vec![0.004; 1500];
+    for (i, radius) in [0.006, 0.012, 0.03, 0.06].into_iter().enumerate() {
+        positions[i * 400] = [0.505, 0.505, 0.504];
+        radii[i * 400] = radius;
+    }
+    let each = Particles { positions: &positions, radii: Radii::Each(&radii), masks: None };
+    let params = plain(0.015);
+    let found = field(&each, &params);
+    let expected = reference::field(&each, &found.lattice, &params);
+    let [nx, ny, nz] = found.lattice.dims;
+    for (i, want) in expected.iter().enumerate() {
+        let got = f64::from(found.values[found.index([i % nx, i / nx % ny, i / nx / ny])]);
+        assert!((got - want).abs() <= 2e-5 * want.max(0.1), "{got} {want}");
+    }
+    assert_eq!(expected.len(), nx * ny * nz);
+}
+
+#[test]
+fn what_is_out_of_all_proportion_ends() {
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0]];
+    for radius in [1e35, 1e38, f32::MAX] {
+        let radii = [radius, 0.5];
+        let each = Particles { positions: &positions, radii: Radii::Each(&radii), masks: None };
+        for voxel in [3e34, 1e38, f32::INFINITY] {
+            let found = field(&each, &plain(voxel));
+            let number = if radius < 1e36 { 2 } else { 1 };
+            assert_eq!(found.counts.particles, number, "{radius} {voxel}");
+            assert!(found.values.iter().all(|v| v.is_finite()), "{radius} {voxel}");
+        }
+    }
+}
+
+#[test]
 fn a_liquid_at_rest_has_a_density_of_one() {
     let positions: Vec<[f32; 3]> =
         (0..20 * 20 * 20).map(|i| [i % 20, i / 20 % 20, i / 400].map(|v| v as f32 * 0.1)).collect();

@@ -229,7 +229,10 @@ fn whole(nearness: f32, [zero, per_unit]: [f32; 2]) -> u32 {
     match nearness {
         f32::INFINITY => ENDS[1] as u32 + 1,
         f32::NEG_INFINITY => ENDS[0] as u32 - 1,
-        _ => (((nearness - zero) * per_unit) as i32 + ENDS[0]).clamp(ENDS[0], ENDS[1]) as u32,
+        _ => {
+            let scaled = ((nearness - zero) * per_unit) as i32;
+            scaled.saturating_add(ENDS[0]).clamp(ENDS[0], ENDS[1]) as u32
+        }
     }
 }
 
@@ -252,7 +255,7 @@ fn of_column(ends: &[f32], scale: [f32; 2], many: &mut Vec<Many>) -> [u32; 2] {
         // Of more than there is room for, nothing is known.
         let place = if ends.len() <= all.len() { many.len() as u32 } else { u32::MAX };
         many.extend((place != u32::MAX).then_some(all));
-        return [a | ((d - 1) | 1) << 16, place];
+        return [a | (d.saturating_sub(1) | 1) << 16, place];
     }
     let c = ends.get(2).map_or(b, |nearness| whole(*nearness, scale));
     record([a, b, c, d])
@@ -357,4 +360,21 @@ fn in_common<'a>(parts: impl Iterator<Item = &'a Block> + Clone) -> Block {
         }
     }
     block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_never_fall() {
+        let all = [f32::NEG_INFINITY, f32::MIN, -1.0, 0.25, 0.3, 0.5, 1e6, f32::MAX, f32::INFINITY];
+        for per_unit in [0.0, 1e5, f32::MAX] {
+            let found = all.map(|nearness| whole(nearness, [0.25, per_unit]));
+            assert!(found.is_sorted(), "{per_unit}: {found:?}");
+            assert_eq!([found[0], found[all.len() - 1]], [0, 0xffff]);
+            let finite = &found[1..all.len() - 1];
+            assert!(finite.iter().all(|n| (1..=0xfffe).contains(n)), "{per_unit}: {finite:?}");
+        }
+    }
 }
