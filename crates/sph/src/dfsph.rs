@@ -37,7 +37,7 @@ const STRIDES: (f64, f64) = (0.1, 3.0);
 /// The part of the last step's pressure that the next begins with.
 const WARM: f32 = 0.9;
 /// The part of what moves particles to their places that stays as velocity.
-const KEPT: f32 = 0.3;
+const KEPT: f32 = 0.4;
 
 /// The part of the tolerance at which velocities are right: what is wrong with them stays.
 const VELOCITY: f64 = 0.3;
